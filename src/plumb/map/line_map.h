@@ -1,0 +1,77 @@
+// The line map: fused 3D lines with covariance and visibility, and the key frames they come from.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rigid3.h"
+#include "plumb/geometry/segment.h"
+
+namespace plumb {
+
+/// A 3D line fused over the key frames that observed it.
+struct MapLine {
+  Segment3 segment_in_world;
+  /// Covariance of the two anchor points [m^2], rank 2: free across the line only.
+  Eigen::Matrix3d covariance_start = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d covariance_end = Eigen::Matrix3d::Zero();
+  uint32_t num_observing = 0;  // key frames that observed the line
+  uint32_t num_expected = 0;   // key frames in which it should be visible, >= num_observing
+};
+
+/// One key frame that observed a line, as seen from the line's midpoint.
+struct LineSighting {
+  uint32_t key_frame = 0;
+  Eigen::Vector3f direction_to_camera = Eigen::Vector3f::Zero();  // unit, world frame
+  float distance_m = 0.0f;
+};
+
+/// A segment of one key frame with the 3D segment that its own depth gives it. The last step of
+/// the refinement uses these, not the fused lines (they agree better with their neighbourhood).
+struct LiftedSegment {
+  Segment2 segment_px;
+  Segment3 segment_in_world;
+  std::optional<uint32_t> line;  // fused line that it supports
+};
+
+/// A point of one key frame for the optional point front-end.
+struct MapPoint {
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+  Eigen::Vector3f point_in_world = Eigen::Vector3f::Zero();
+  std::array<uint8_t, 128> descriptor{};  // SIFT, as OpenCV scales it to bytes
+};
+
+struct KeyFrame {
+  int64_t timestamp_ns = 0;
+  Rigid3 cam_from_world;
+  Camera camera;
+  std::vector<LiftedSegment> segments;
+  std::vector<MapPoint> points;
+};
+
+/// Plain data; MapIndex answers queries over it, map_file reads and writes it.
+struct LineMap {
+  std::vector<MapLine> lines;
+  /// Sightings of line i: sightings[sighting_begin[i] .. sighting_begin[i + 1]).
+  std::vector<uint32_t> sighting_begin{0};
+  std::vector<LineSighting> sightings;
+  std::vector<KeyFrame> key_frames;
+  /// Detector that made the segments; a query should use the same one.
+  std::string detector;
+  /// Factor on the pose covariance, calibrated on left-out key frames; 1 when not calibrated.
+  double covariance_factor = 1.0;
+
+  std::span<const LineSighting> SightingsOf(uint32_t line) const {
+    return std::span(sightings).subspan(sighting_begin[line],
+                                        sighting_begin[line + 1] - sighting_begin[line]);
+  }
+};
+
+}  // namespace plumb

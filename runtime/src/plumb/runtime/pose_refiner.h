@@ -1,0 +1,112 @@
+// From a prior pose and 2D segments to a refined pose, its covariance and an honest status.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "plumb/base/result.h"
+#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rigid3.h"
+#include "plumb/geometry/segment.h"
+#include "plumb/map/map_index.h"
+
+namespace plumb {
+
+/// What became of a frame. Only kRefined changes the pose; every other status returns the prior.
+enum class RefineStatus {
+  kRefined,
+  kKeptPrior,   // the best pose found does not explain the lines better than the prior does
+  kAmbiguous,   // a clearly different pose explains the lines as well
+  kDegenerate,  // the matched lines leave a direction of the pose unobserved
+  kLowSupport,  // too few lines, or too little of the visible map was found in the image
+};
+std::string_view ToString(RefineStatus status);  // "REFINED", "KEPT_PRIOR", ...
+
+/// A coarse pose and how far off it may be.
+struct PosePrior {
+  Rigid3 cam_from_world;
+  /// Norms of the uncertainty (one standard deviation of the whole vector, not per component).
+  double position_sigma_m = 0.10;
+  double rotation_sigma_rad = 0.0349;
+};
+
+/// A 2D-3D point correspondence, from the host or from points/.
+struct PointMatch {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  /// Standard deviation of the point along the ray of the camera that made it, as a vector in the
+  /// world [m]; zero when the point is exact.
+  Eigen::Vector3d deviation_in_world = Eigen::Vector3d::Zero();
+};
+
+enum class RefineMethod { kSearch, kPaper };
+
+struct PoseRefinerOptions {
+  RefineMethod method = RefineMethod::kSearch;
+  uint32_t num_hypotheses = 1500;  // of the search, 1..2048
+  /// Smallest share of the visible map's length that the segments must explain, in (0, 1). 0.12
+  /// suits segments that RefineSegments trimmed.
+  double min_map_support = 0.12;
+  /// Seed of the search's random draws; the frame's `seed` is mixed in.
+  uint64_t seed = 0;
+
+  Status Validate() const;
+};
+
+struct RefineInput {
+  Camera camera;
+  std::span<const Segment2> segments;  // after RefineSegments
+  PosePrior prior;
+  std::span<const PointMatch> points;  // optional
+  /// False: local refinement only, for priors within about 2 cm / 0.5 deg (stream mode).
+  bool search = true;
+  uint64_t seed = 0;  // e.g. the frame's number; equal inputs and seeds give equal results
+};
+
+/// Segment `segment` of the input explained by map line `line`.
+struct LineMatch {
+  uint32_t segment = 0;
+  uint32_t line = 0;
+  double distance_px = 0.0;  // rms perpendicular distance of the overlap's ends
+};
+
+struct RefineResult {
+  RefineStatus status = RefineStatus::kLowSupport;
+  Rigid3 cam_from_world;  // the prior unless kRefined
+  /// Of the left perturbation (rotation [rad], translation [m]) of cam_from_world; the prior's own
+  /// unless kRefined.
+  Matrix6d covariance = Matrix6d::Identity();
+  int num_observed_directions = 0;  // of 6, directions that the matches determine better than the prior
+  double map_support = 0.0;         // share of the visible map's length that was found, 0..1
+  double runner_up_ratio = 0.0;     // support of the best clearly different pose over the winner's
+  std::vector<LineMatch> matches;   // at cam_from_world
+  uint32_t num_points_used = 0;
+  // Time of the stages [ns].
+  int64_t search_ns = 0, match_and_refine_ns = 0, total_ns = 0;
+};
+
+/// Refines poses against one map. Not thread-safe; use one per thread. After the first few frames
+/// Refine() allocates only what `out_result` needs to grow.
+class PoseRefiner {
+ public:
+  /// `index` is borrowed and must outlive the refiner.
+  static Result<std::unique_ptr<PoseRefiner>> Create(const MapIndex& index,
+                                                     const PoseRefinerOptions& options);
+  ~PoseRefiner();
+
+  /// @return kInvalidArgument naming the value if a pose, camera, uncertainty, segment or point is
+  ///         not finite or out of range. "No better pose" is a status, not an error.
+  Status Refine(const RefineInput& input, RefineResult* out_result);
+
+ private:
+  struct Impl;
+  explicit PoseRefiner(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace plumb

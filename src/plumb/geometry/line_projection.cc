@@ -20,8 +20,15 @@ std::optional<ImageLine> ProjectLine(const Camera& camera, const Segment3& segme
 
 std::optional<Segment2> ProjectSegment(const Camera& camera, const Rigid3& cam_from_world,
                                        const Segment3& segment_in_world, double margin_px) {
-  Eigen::Vector3d a = cam_from_world * segment_in_world.start;
-  Eigen::Vector3d b = cam_from_world * segment_in_world.end;
+  return ProjectSegmentInCam(
+      camera, {cam_from_world * segment_in_world.start, cam_from_world * segment_in_world.end},
+      margin_px);
+}
+
+std::optional<Segment2> ProjectSegmentInCam(const Camera& camera, const Segment3& segment_in_cam,
+                                            double margin_px) {
+  Eigen::Vector3d a = segment_in_cam.start;
+  Eigen::Vector3d b = segment_in_cam.end;
   if (!(a.z() > kNearPlane || b.z() > kNearPlane)) return std::nullopt;
   const auto clip_to_near = [](const Eigen::Vector3d& inside, Eigen::Vector3d& outside) {
     outside = inside + (inside.z() - kNearPlane) / (inside.z() - outside.z()) * (outside - inside);

@@ -38,4 +38,8 @@ std::optional<ImageLine> ProjectLine(const Camera& camera, const Segment3& segme
 std::optional<Segment2> ProjectSegment(const Camera& camera, const Rigid3& cam_from_world,
                                        const Segment3& segment_in_world, double margin_px = 0.0);
 
+/// The same for a segment in camera coordinates.
+std::optional<Segment2> ProjectSegmentInCam(const Camera& camera, const Segment3& segment_in_cam,
+                                            double margin_px = 0.0);
+
 }  // namespace plumb

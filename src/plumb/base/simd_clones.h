@@ -1,0 +1,13 @@
+// Function multiversioning for hot loops that the compiler vectorises.
+#pragma once
+
+// PLUMB_SIMD_CLONES before a function definition compiles it for the baseline and for AVX2 + FMA;
+// the loader picks one at start-up. It is empty where the tool chain cannot do it: other
+// architectures, other compilers, and sanitizers (their runtime starts after the loader's choice).
+// Clones may round differently, so results are reproducible per machine, not across machines.
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define PLUMB_SIMD_CLONES __attribute__((target_clones("default", "arch=haswell")))
+#else
+#define PLUMB_SIMD_CLONES
+#endif

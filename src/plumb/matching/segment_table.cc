@@ -1,0 +1,67 @@
+#include "plumb/matching/segment_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace plumb {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+float UndirectedAngle(const Segment2& segment) {
+  const Eigen::Vector2d delta = segment.Delta();
+  double angle = std::atan2(delta.y(), delta.x());
+  if (angle < 0.0) angle += std::numbers::pi;
+  const float rounded = static_cast<float>(angle);
+  return rounded < kPi ? rounded : 0.0f;
+}
+
+}  // namespace
+
+void SegmentTable::Assign(std::span<const Segment2> segments) {
+  for (std::vector<float>* column :
+       {&x0, &y0, &x1, &y1, &direction_x, &direction_y, &length, &angle}) {
+    column->clear();
+  }
+  source.clear();
+  for (uint32_t i = 0; i < segments.size(); ++i) {
+    if (segments[i].Length() > 1e-6) source.push_back(i);
+  }
+  angle.resize(segments.size());
+  for (const uint32_t i : source) angle[i] = UndirectedAngle(segments[i]);
+  std::sort(source.begin(), source.end(), [&](uint32_t a, uint32_t b) {
+    return angle[a] != angle[b] ? angle[a] < angle[b] : a < b;
+  });
+  angle.clear();
+  for (const uint32_t i : source) {
+    const Segment2& segment = segments[i];
+    const double pixels = segment.Length();
+    const Eigen::Vector2d direction = segment.Delta() / pixels;
+    x0.push_back(static_cast<float>(segment.start.x()));
+    y0.push_back(static_cast<float>(segment.start.y()));
+    x1.push_back(static_cast<float>(segment.end.x()));
+    y1.push_back(static_cast<float>(segment.end.y()));
+    direction_x.push_back(static_cast<float>(direction.x()));
+    direction_y.push_back(static_cast<float>(direction.y()));
+    length.push_back(static_cast<float>(pixels));
+    angle.push_back(UndirectedAngle(segment));
+  }
+}
+
+std::array<SegmentTable::Range, 2> SegmentTable::NearAngle(float around, float max_sine) const {
+  const uint32_t count = static_cast<uint32_t>(angle.size());
+  // A little wider than asked, so that rounding never loses a row; callers test the sine itself.
+  const float half = max_sine < 1.0f ? std::asin(max_sine) + 1e-4f : kPi;
+  if (half >= 0.5f * kPi) return {Range{0, count}, Range{}};
+  const auto first_at_least = [&](float value) {
+    return static_cast<uint32_t>(std::lower_bound(angle.begin(), angle.end(), value) -
+                                 angle.begin());
+  };
+  const float low = around - half, high = around + half;
+  if (low < 0.0f) return {Range{0, first_at_least(high)}, Range{first_at_least(low + kPi), count}};
+  if (high > kPi) return {Range{0, first_at_least(high - kPi)}, Range{first_at_least(low), count}};
+  return {Range{first_at_least(low), first_at_least(high)}, Range{}};
+}
+
+}  // namespace plumb

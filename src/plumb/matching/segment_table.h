@@ -1,0 +1,38 @@
+// A frame's segments, sorted by orientation for fast pairing with projected lines.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "plumb/geometry/segment.h"
+
+namespace plumb {
+
+/// Parallel arrays, ascending in `angle`; ties keep the order of the input.
+class SegmentTable {
+ public:
+  /// Half-open range of rows.
+  struct Range {
+    uint32_t begin = 0, end = 0;
+  };
+
+  /// Takes the segments; those without length are left out. No allocation once the capacity
+  /// suffices.
+  void Assign(std::span<const Segment2> segments);
+
+  size_t size() const { return source.size(); }
+
+  /// Rows whose direction makes an angle of at most asin(max_sine) with `angle` (in [0, pi)), as up
+  /// to two ranges; the second is empty when the angles do not wrap around.
+  std::array<Range, 2> NearAngle(float angle, float max_sine) const;
+
+  std::vector<uint32_t> source;                 // index into the input
+  std::vector<float> x0, y0, x1, y1;            // end points [px]
+  std::vector<float> direction_x, direction_y;  // unit
+  std::vector<float> length;                    // [px]
+  std::vector<float> angle;                     // [0, pi)
+};
+
+}  // namespace plumb

@@ -1,0 +1,133 @@
+#include "plumb/features/segment_refiner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "plumb/features/blurred_image.h"
+#include "plumb/features/luminance.h"
+#include "plumb/features/segment_ridge.h"
+
+namespace plumb {
+namespace {
+
+constexpr uint32_t kMaxSegments = 4096;
+// Beyond this a coordinate cannot belong to an image (16384 px a side) and would only cost digits.
+constexpr double kMaxCoordinatePx = 1e5;
+
+bool IsUsable(const Segment2& segment) {
+  // Written so that NaN fails.
+  return segment.start.cwiseAbs().maxCoeff() < kMaxCoordinatePx &&
+         segment.end.cwiseAbs().maxCoeff() < kMaxCoordinatePx && std::isfinite(segment.score);
+}
+
+// A kept segment, prepared for the comparison with many others.
+struct KeptSegment {
+  Eigen::Vector2d start, unit;
+  double length = 0.0;
+};
+
+// Whether more than 70 % of `segment` lies within 1.5 px of `kept`, nearly parallel to it.
+bool IsCoveredBy(const Eigen::Vector2d& start, const Eigen::Vector2d& unit, double length,
+                 const KeptSegment& kept) {
+  constexpr double kMaxSine = 0.05, kMaxDistancePx = 1.5, kMinShare = 0.7;
+  const double sine = kept.unit.x() * unit.y() - kept.unit.y() * unit.x();
+  if (std::abs(sine) >= kMaxSine) return false;
+  const Eigen::Vector2d relative = start - kept.start;
+  // Along the segment, at distance s from its start: position along `kept` and distance from it.
+  const double along = kept.unit.dot(relative);
+  const double across = kept.unit.x() * relative.y() - kept.unit.y() * relative.x();
+  const double cosine = kept.unit.dot(unit);
+  // s for which 0 <= along + s * cosine <= kept.length; |cosine| is nearly one.
+  double s0 = -along / cosine, s1 = (kept.length - along) / cosine;
+  if (s0 > s1) std::swap(s0, s1);
+  s0 = std::max(s0, 0.0);
+  s1 = std::min(s1, length);
+  // s for which |across + s * sine| < 1.5 px.
+  if (std::abs(sine) < 1e-9) {
+    if (std::abs(across) >= kMaxDistancePx) return false;
+  } else {
+    double d0 = (-kMaxDistancePx - across) / sine, d1 = (kMaxDistancePx - across) / sine;
+    if (d0 > d1) std::swap(d0, d1);
+    s0 = std::max(s0, d0);
+    s1 = std::min(s1, d1);
+  }
+  return s1 - s0 > kMinShare * length;
+}
+
+}  // namespace
+
+struct SegmentRefiner::Impl {
+  SegmentRefinerOptions options;
+  BlurredImage blurred;
+  std::vector<uint8_t> gray;
+  std::vector<Segment2> candidates;
+  std::vector<KeptSegment> kept;
+
+  bool IsLongEnough(const Segment2& segment) const {
+    return segment.Length() > options.min_length_px;
+  }
+
+  void SelectCandidates(std::span<const Segment2> segments) {
+    candidates.clear();
+    for (const Segment2& segment : segments) {
+      if (IsUsable(segment) && IsLongEnough(segment)) candidates.push_back(segment);
+    }
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Segment2& a, const Segment2& b) { return a.score > b.score; });
+    size_t count = 0;
+    while (count < candidates.size() && candidates[count].score >= options.min_score) ++count;
+    count = std::max<size_t>(count, options.min_count);
+    count = std::min<size_t>(count, options.max_count);
+    candidates.resize(std::min(count, candidates.size()));
+  }
+
+  bool MoveOnEdge(Segment2* segment) const {
+    MoveToRidge(blurred, kWideHalfWidthPx, segment);
+    MoveToRidge(blurred, kNarrowHalfWidthPx, segment);
+    if (options.trim) {
+      if (!TrimToEdge(blurred, segment)) return false;
+      MoveToRidge(blurred, kNarrowHalfWidthPx, segment);
+    }
+    return IsLongEnough(*segment);
+  }
+
+  // Remembers the segment unless one that was kept before explains it.
+  bool KeepUnlessDuplicate(const Segment2& segment) {
+    const double length = segment.Length();
+    const Eigen::Vector2d unit = segment.Delta() / length;
+    for (const KeptSegment& other : kept) {
+      if (IsCoveredBy(segment.start, unit, length, other)) return false;
+    }
+    kept.push_back({segment.start, unit, length});
+    return true;
+  }
+};
+
+SegmentRefiner::SegmentRefiner(const SegmentRefinerOptions& options)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->options = options;
+  impl_->options.max_count = std::clamp(options.max_count, uint32_t{1}, kMaxSegments);
+  impl_->options.min_length_px = std::max(options.min_length_px, 1.0);
+}
+
+SegmentRefiner::~SegmentRefiner() = default;
+
+std::vector<Segment2> SegmentRefiner::Refine(const ImageView& image,
+                                             std::span<const Segment2> segments) {
+  std::vector<Segment2> refined;
+  if (!image.Validate()) return refined;
+  impl_->SelectCandidates(segments);
+  if (impl_->candidates.empty()) return refined;
+  impl_->blurred.Assign(Luminance(image, &impl_->gray));
+  impl_->kept.clear();
+  refined.reserve(impl_->candidates.size());
+  for (Segment2 segment : impl_->candidates) {
+    if (!impl_->MoveOnEdge(&segment)) continue;
+    if (impl_->options.remove_duplicates && !impl_->KeepUnlessDuplicate(segment)) continue;
+    refined.push_back(segment);
+  }
+  return refined;
+}
+
+}  // namespace plumb

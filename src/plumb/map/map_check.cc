@@ -1,0 +1,161 @@
+#include "plumb/map/map_check.h"
+
+#include <cmath>
+#include <string>
+
+namespace plumb {
+namespace {
+
+constexpr double kUnitTolerance = 1e-3;
+constexpr size_t kMaxDetectorBytes = 1024;
+constexpr int kMaxImageSide = 65536;
+
+Error Bad(const std::string& object, size_t index, const std::string& what) {
+  return {ErrorCode::kInvalidArgument, object + " " + std::to_string(index) + " " + what};
+}
+
+bool HasLength(const Segment3& segment) {
+  return segment.start.allFinite() && segment.end.allFinite() && segment.Length() > 0.0;
+}
+
+bool HasLength(const Segment2& segment) {
+  return segment.start.allFinite() && segment.end.allFinite() && segment.Length() > 0.0;
+}
+
+bool IsCovariance(const Eigen::Matrix3d& matrix) {
+  return matrix.allFinite() && matrix.diagonal().minCoeff() >= 0.0 &&
+         (matrix - matrix.transpose()).cwiseAbs().maxCoeff() <= 1e-6 * matrix.cwiseAbs().maxCoeff();
+}
+
+Status CheckLines(const LineMap& map) {
+  for (size_t i = 0; i < map.lines.size(); ++i) {
+    const MapLine& line = map.lines[i];
+    if (!HasLength(line.segment_in_world)) return Bad("Line", i, "has no finite, positive length");
+    if (!IsCovariance(line.covariance_start) || !IsCovariance(line.covariance_end)) {
+      return Bad("Line", i, "has a covariance that is not finite, symmetric and non-negative");
+    }
+    if (line.num_observing < 1 || line.num_observing > line.num_expected) {
+      return Bad("Line", i,
+                 "is observed by " + std::to_string(line.num_observing) + " of " +
+                     std::to_string(line.num_expected) + " expected key frames");
+    }
+  }
+  return Ok();
+}
+
+Status CheckSightings(const LineMap& map) {
+  const auto& begin = map.sighting_begin;
+  if (begin.size() != map.lines.size() + 1 || begin.front() != 0 ||
+      begin.back() != map.sightings.size()) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "The sighting ranges do not cover " + std::to_string(map.sightings.size()) +
+                     " sightings of " + std::to_string(map.lines.size()) + " lines"};
+  }
+  for (size_t i = 0; i + 1 < begin.size(); ++i) {
+    if (begin[i] > begin[i + 1]) return Bad("Line", i, "has a sighting range of negative length");
+  }
+  for (size_t i = 0; i < map.lines.size(); ++i) {
+    for (size_t k = begin[i]; k < begin[i + 1]; ++k) {
+      const LineSighting& sighting = map.sightings[k];
+      if (sighting.key_frame >= map.key_frames.size()) {
+        return Bad("Sighting", k,
+                   "refers to key frame " + std::to_string(sighting.key_frame) + " of " +
+                       std::to_string(map.key_frames.size()));
+      }
+      if (k > begin[i] && sighting.key_frame <= map.sightings[k - 1].key_frame) {
+        return Bad("Sighting", k, "breaks the ascending order of the line's key frames");
+      }
+      const float norm = sighting.direction_to_camera.norm();
+      if (!(std::abs(norm - 1.0f) <= kUnitTolerance)) {
+        return Bad("Sighting", k, "has a direction of length " + std::to_string(norm));
+      }
+      if (!(sighting.distance_m > 0.0f) || !std::isfinite(sighting.distance_m)) {
+        return Bad("Sighting", k,
+                   "has a distance of " + std::to_string(sighting.distance_m) + " m");
+      }
+    }
+  }
+  return Ok();
+}
+
+Status CheckSegments(const KeyFrame& key_frame, size_t index, size_t num_lines) {
+  for (const LiftedSegment& segment : key_frame.segments) {
+    if (!HasLength(segment.segment_px) || !HasLength(segment.segment_in_world)) {
+      return Bad("Key frame", index, "has a segment without finite, positive length");
+    }
+    if (!(segment.segment_px.score >= 0.0 && segment.segment_px.score <= 1.0)) {
+      return Bad("Key frame", index,
+                 "has a segment with score " + std::to_string(segment.segment_px.score));
+    }
+    if (segment.line && *segment.line >= num_lines) {
+      return Bad("Key frame", index,
+                 "has a segment of line " + std::to_string(*segment.line) + " of " +
+                     std::to_string(num_lines));
+    }
+  }
+  for (const MapPoint& point : key_frame.points) {
+    if (!point.pixel.allFinite() || !point.point_in_world.allFinite()) {
+      return Bad("Key frame", index, "has a point that is not finite");
+    }
+  }
+  return Ok();
+}
+
+Status CheckKeyFrames(const LineMap& map) {
+  for (size_t i = 0; i < map.key_frames.size(); ++i) {
+    const KeyFrame& key_frame = map.key_frames[i];
+    if (!key_frame.cam_from_world.IsFinite() ||
+        std::abs(key_frame.cam_from_world.rotation.norm() - 1.0) > kUnitTolerance) {
+      return Bad("Key frame", i, "has a pose that is not finite or not a rotation");
+    }
+    if (!key_frame.camera.IsValid() || key_frame.camera.width_px > kMaxImageSide ||
+        key_frame.camera.height_px > kMaxImageSide) {
+      return Bad("Key frame", i, "has invalid intrinsics or image size");
+    }
+    if (Status status = CheckSegments(key_frame, i, map.lines.size()); !status) return status;
+  }
+  return Ok();
+}
+
+/// Also refuses over-long forms and surrogates, which JSON writers refuse.
+bool IsUtf8(const std::string& text) {
+  for (size_t i = 0; i < text.size();) {
+    const auto byte = [&](size_t k) { return static_cast<unsigned char>(text[k]); };
+    const unsigned char lead = byte(i);
+    const size_t length = lead < 0x80   ? 1
+                          : lead < 0xc2 ? 0
+                          : lead < 0xe0 ? 2
+                          : lead < 0xf0 ? 3
+                          : lead < 0xf5 ? 4
+                                        : 0;
+    if (length == 0 || i + length > text.size()) return false;
+    for (size_t k = 1; k < length; ++k) {
+      if ((byte(i + k) & 0xc0) != 0x80) return false;
+    }
+    if ((lead == 0xe0 && byte(i + 1) < 0xa0) || (lead == 0xed && byte(i + 1) > 0x9f) ||
+        (lead == 0xf0 && byte(i + 1) < 0x90) || (lead == 0xf4 && byte(i + 1) > 0x8f)) {
+      return false;
+    }
+    i += length;
+  }
+  return true;
+}
+
+}  // namespace
+
+Status CheckMap(const LineMap& map) {
+  if (!(map.covariance_factor > 0.0) || !std::isfinite(map.covariance_factor)) {
+    return Error{ErrorCode::kInvalidArgument, "The covariance factor is " +
+                                                  std::to_string(map.covariance_factor) +
+                                                  ", not a positive number"};
+  }
+  if (map.detector.size() > kMaxDetectorBytes || !IsUtf8(map.detector)) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "The detector's name is longer than 1024 bytes or not UTF-8"};
+  }
+  if (Status status = CheckLines(map); !status) return status;
+  if (Status status = CheckSightings(map); !status) return status;
+  return CheckKeyFrames(map);
+}
+
+}  // namespace plumb

@@ -1,0 +1,74 @@
+// Builds a line map from posed RGB-D key frames: lift, fuse over the views, filter, visibility.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "plumb/base/result.h"
+#include "plumb/map/depth_view.h"
+#include "plumb/map/lift.h"
+#include "plumb/map/line_fusion.h"
+#include "plumb/map/line_map.h"
+#include "plumb/map/pnp_filter.h"
+
+namespace plumb {
+
+struct MapBuilderOptions {
+  LiftOptions lift;
+  LineFusionOptions fusion;
+  PnpFilterOptions pnp_filter;
+  std::string detector;  // goes into the map: queries should use the same one
+};
+
+/// One posed RGB-D frame. Borrowed: segments and depth must outlive AddKeyFrame() only.
+struct KeyFrameInput {
+  int64_t timestamp_ns = 0;
+  Rigid3 cam_from_world;
+  Camera camera;
+  std::span<const Segment2> segments;  // [px], after SegmentRefiner
+  DepthView depth;                     // registered to the colour image
+  std::vector<MapPoint> points;        // optional, for the point front-end; kept as they are
+};
+
+/// What became of the segments.
+struct MapBuildStats {
+  size_t num_key_frames = 0;
+  size_t num_segments = 0;          // given
+  size_t num_lifted = 0;            // with 3D end points
+  size_t num_filtered = 0;          // lifted, but rejected by the PnP-RANSAC filter
+  size_t num_lines = 0;             // fused
+  size_t num_multi_view_lines = 0;  // of those, seen by two key frames or more
+};
+
+/// Called with the share of the work that is done, 0..1, ascending.
+using MapBuildProgress = std::function<void(double done)>;
+
+/// Add the key frames, then Build(). Needs no detector: the caller brings the segments.
+/// Deterministic; not thread-safe. Memory: about 300 bytes a lifted segment.
+class MapBuilder {
+ public:
+  explicit MapBuilder(MapBuilderOptions options = {});
+
+  /// Lifts the frame's segments.
+  /// @return kInvalidArgument, and the builder is unchanged, when the camera, the pose or the depth
+  ///         image is invalid, the depth image has another size than the camera, or a frame with
+  ///         this timestamp was added before. The message names the frame by its timestamp.
+  Status AddKeyFrame(KeyFrameInput frame);
+
+  /// Fuses everything added so far; may be called again after more frames.
+  /// @return kInvalidArgument when no key frame was added. A map without lines is not an error.
+  Result<LineMap> Build(const MapBuildProgress& progress = {});
+
+  /// Of the last Build(); before it, of the frames added so far.
+  const MapBuildStats& stats() const { return stats_; }
+
+ private:
+  MapBuilderOptions options_;
+  std::vector<KeyFrame> key_frames_;
+  MapBuildStats stats_;
+};
+
+}  // namespace plumb

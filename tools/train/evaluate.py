@@ -1,0 +1,101 @@
+"""sAP of a weights file or training state on a folder with images/ and annotations.json.
+
+usage: evaluate.py WEIGHTS DIR [--size N] [--top-k N] [--nms-decay X] [--detections OUT.json]
+"""
+import argparse
+import json
+import os
+
+import cv2
+import numpy as np
+import torch
+
+import weights_file
+from model import MEAN, STD, STRIDE
+from sap import sap
+from targets import clip_lines, decode
+
+DISPLACEMENT_SCALE = 16.0
+TOP_K = 500
+NMS_DECAY = 0.0
+
+
+def to_tensor(images):
+    """RGB uint8 [N, H, W, 3] -> normalised float [N, 3, H, W] in channels-last memory."""
+    x = torch.from_numpy(np.ascontiguousarray(images)).permute(0, 3, 1, 2).float()
+    mean, std = (torch.tensor(v).view(1, 3, 1, 1) for v in (MEAN, STD))
+    return ((x - mean) / std).contiguous(memory_format=torch.channels_last)
+
+
+@torch.no_grad()
+def detect(model, images, size, displacement_scale=DISPLACEMENT_SCALE, top_k=TOP_K, nms_decay=NMS_DECAY, threshold=0.0, batch=8):
+    """Lines in pixels of each RGB image (0 = centre of the first pixel), clipped to it, with scores: [(lines, scores)]."""
+    device = next(model.parameters()).device
+    model.eval()
+    results = []
+    for start in range(0, len(images), batch):
+        chunk = images[start : start + batch]
+        x = to_tensor(np.stack([cv2.resize(i, (size, size), interpolation=cv2.INTER_LINEAR) for i in chunk])).to(device)
+        maps = model(x).float()
+        p = torch.sigmoid(maps[:, 1] - maps[:, 0]).cpu().numpy()
+        offset = torch.sigmoid(maps[:, 2:4]).cpu().numpy()
+        dis = (maps[:, 4:6] * displacement_scale).cpu().numpy()
+        for k, image in enumerate(chunk):
+            lines, scores = decode(p[k], offset[k], dis[k], top_k, nms_decay, threshold)
+            cells = size // STRIDE
+            lines, inside = clip_lines(lines, cells, cells)
+            lines, scores = lines[inside], scores[inside]
+            h, w = image.shape[:2]
+            results.append((lines * STRIDE * np.array([w / size, h / size] * 2) - 0.5, scores))
+    return results
+
+
+def load_annotated(folder):
+    """[(name, RGB image, lines [N, 4] in pixels)] of a folder with images/ and annotations.json."""
+    with open(os.path.join(folder, "annotations.json")) as f:
+        annotations = json.load(f)
+    result = []
+    for a in annotations:
+        path = os.path.join(folder, "images", a["filename"])
+        image = cv2.imread(path, cv2.IMREAD_COLOR)
+        if image is None:
+            raise OSError(f"cannot read image {path}")
+        result.append((a["filename"], cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.asarray(a["lines"], float).reshape(-1, 4)))
+    return result
+
+
+def score(model, annotated, size, **options):
+    """(sAP5, sAP10, sAP15) and the detections of a model on `load_annotated` data."""
+    detections = detect(model, [i for _, i, _ in annotated], size, **options)
+    sizes = [(i.shape[1], i.shape[0]) for _, i, _ in annotated]
+    return sap(detections, [t for _, _, t in annotated], sizes), detections
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("weights", help=".safetensors file")
+    parser.add_argument("data", help="folder with images/ and annotations.json")
+    parser.add_argument("--size", type=int, help="input edge in pixels; default: the file's")
+    parser.add_argument("--top-k", type=int, default=TOP_K)
+    parser.add_argument("--nms-decay", type=float, help="score factor of non-maxima; default: the file's")
+    parser.add_argument("--detections", help="also write the segments as JSON")
+    args = parser.parse_args()
+    model, metadata = weights_file.load_model(args.weights)
+    decay = float(metadata["nms_decay"]) if args.nms_decay is None else args.nms_decay
+    annotated = load_annotated(args.data)
+    size = args.size or int(metadata["input_width"])
+    scale = float(metadata["displacement_scale"])
+    values, detections = score(model, annotated, size, displacement_scale=scale, top_k=args.top_k, nms_decay=decay)
+    print(json.dumps({"sAP5": values[0], "sAP10": values[1], "sAP15": values[2], "images": len(annotated), "size": size}))
+    if args.detections:
+        rows = [
+            {"file": n, "width": i.shape[1], "height": i.shape[0], "lines": l.tolist(), "scores": s.tolist()}
+            for (n, i, _), (l, s) in zip(annotated, detections)
+        ]
+        with open(args.detections, "w") as f:
+            json.dump(rows, f)
+
+
+if __name__ == "__main__":
+    torch.set_num_threads(os.cpu_count() or 1)
+    main()

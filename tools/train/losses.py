@@ -1,0 +1,54 @@
+"""Losses on raw network maps against the maps of `targets.encode`."""
+import torch
+import torch.nn.functional as F
+
+POSITIVE_WEIGHT = 5.0  # of cells that hold a midpoint, against the ~95 % that do not
+
+
+def sign_invariant(predicted, target):
+    """L1 distance [N] between displacements [N, 2] where v and -v are the same line."""
+    return torch.minimum((predicted - target).abs().sum(1), (predicted + target).abs().sum(1))
+
+
+def soft_bce(logit, target, positive_weight):
+    """Mean cross entropy against soft targets; cells with a target above zero count `positive_weight` times."""
+    weight = 1 + (positive_weight - 1) * (target > 0).to(logit.dtype)
+    return (F.binary_cross_entropy_with_logits(logit, target, reduction="none") * weight).mean()
+
+
+def line_loss(maps, target, displacement_scale, fixed_sign=False):
+    """Loss terms (midpoint, offset, displacement) of one stack: maps [N, 6, h, w], target [N, 8, h, w].
+
+    `fixed_sign` asks for the target's own sign, which early on keeps neighbouring features from choosing opposite ones.
+    """
+    maps = maps.float()
+    midpoint = soft_bce(maps[:, 1] - maps[:, 0], target[:, 0], POSITIVE_WEIGHT)
+    n, y, x = torch.nonzero(target[:, 1] > 0, as_tuple=True)
+    if not len(n):
+        zero = maps.sum() * 0
+        return midpoint, zero, zero
+    predicted, wanted = maps.permute(0, 2, 3, 1)[n, y, x], target.permute(0, 2, 3, 1)[n, y, x]
+    weight = wanted[:, 1] / wanted[:, 1].sum()
+    offset = ((torch.sigmoid(predicted[:, 2:4]) - wanted[:, 2:4]).abs().sum(1) * weight).sum()
+    dis = predicted[:, 4:6] * displacement_scale
+    error = (dis - wanted[:, 4:6]).abs().sum(1) if fixed_sign else sign_invariant(dis, wanted[:, 4:6])
+    return midpoint, offset, (error * weight).sum()
+
+
+def auxiliary_loss(aux, target):
+    """Line coverage and end points, [N, 2, h, w] logits: features for these help the midpoints."""
+    aux = aux.float()
+    return soft_bce(aux[:, 0], target[:, 6], 2.0) + soft_bce(aux[:, 1], target[:, 7], POSITIVE_WEIGHT)
+
+
+WEIGHTS = {"midpoint": 8.0, "offset": 0.5, "displacement": 0.15, "auxiliary": 0.5}
+
+
+def total_loss(outputs, target, displacement_scale, fixed_sign=False):
+    """Sum over stacks of the weighted terms, and the last stack's terms as a dict of floats for the log."""
+    total = 0
+    for maps, aux in outputs:
+        terms = dict(zip(("midpoint", "offset", "displacement"), line_loss(maps, target, displacement_scale, fixed_sign)))
+        terms["auxiliary"] = auxiliary_loss(aux, target)
+        total = total + sum(WEIGHTS[k] * v for k, v in terms.items())
+    return total, {k: float(v.detach()) for k, v in terms.items()}

@@ -1,0 +1,1 @@
+# Decoding of the network's output; names are decode/<file>.

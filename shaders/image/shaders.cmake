@@ -1,0 +1,1 @@
+# Image preprocessing; names are image/<file>.

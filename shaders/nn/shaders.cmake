@@ -1,0 +1,1 @@
+# Kernels of the network; names are nn/<file>[_variant].

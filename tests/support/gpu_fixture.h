@@ -1,0 +1,71 @@
+// GoogleTest fixture of every test that uses a Vulkan device.
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "plumb/gpu/buffer.h"
+#include "plumb/gpu/device.h"
+#include "plumb/gpu/transfer.h"
+
+namespace plumb::testing {
+
+/// `*result` after checking that there is one; the error message is shown otherwise.
+#define PLUMB_ASSERT_OK(result) \
+  ASSERT_TRUE((result).has_value()) << ((result).has_value() ? "" : (result).error().message)
+#define PLUMB_EXPECT_OK(result) \
+  EXPECT_TRUE((result).has_value()) << ((result).has_value() ? "" : (result).error().message)
+
+/// Opens the device once per test program, with validation; one message of the layer fails the
+/// test during which it came. Skips, visibly, only where there is no Vulkan device at all.
+class GpuTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    static const Result<std::vector<gpu::DeviceInfo>> devices = gpu::ListDevices();
+    if (!devices) GTEST_SKIP() << devices.error().message;
+    if ((*devices).empty()) GTEST_SKIP() << "no Vulkan device";
+    static Result<std::shared_ptr<gpu::Device>> device =
+        gpu::Device::Create({.selector = "auto", .validation = true, .log = {}});
+    PLUMB_ASSERT_OK(device);
+    device_ = *device;
+    device_->ClearValidationMessages();
+  }
+
+  void TearDown() override {
+    if (device_ == nullptr) return;
+    for (const std::string& message : device_->ValidationMessages()) ADD_FAILURE() << message;
+  }
+
+  /// A buffer that holds `values`.
+  template <typename T>
+  std::unique_ptr<gpu::Buffer> MakeBuffer(const std::vector<T>& values,
+                                          gpu::MemoryUse use = gpu::MemoryUse::kDevice) {
+    Result<std::unique_ptr<gpu::Buffer>> buffer =
+        gpu::Buffer::Create(device_, {"test", values.size() * sizeof(T), use});
+    if (!buffer) {
+      ADD_FAILURE() << buffer.error().message;
+      return nullptr;
+    }
+    PLUMB_EXPECT_OK(gpu::UploadNow(device_, (*buffer)->All(), std::as_bytes(std::span(values))));
+    return std::move(*buffer);
+  }
+
+  /// The contents of a slice.
+  template <typename T>
+  std::vector<T> Read(const gpu::BufferSlice& slice) {
+    std::vector<T> values(slice.size_bytes / sizeof(T));
+    PLUMB_EXPECT_OK(gpu::ReadNow(device_, slice, std::as_writable_bytes(std::span(values))));
+    return values;
+  }
+
+  std::shared_ptr<gpu::Device> device_;
+};
+
+}  // namespace plumb::testing

@@ -12,6 +12,8 @@ bool HasSubsampledChroma(PixelFormat format) {
          format == PixelFormat::kI420;
 }
 
+}  // namespace
+
 int NumPlanes(PixelFormat format) {
   switch (format) {
     case PixelFormat::kGray8:
@@ -27,20 +29,21 @@ int NumPlanes(PixelFormat format) {
   return 0;
 }
 
-// Bytes of one row of plane `plane` of an image `width_px` wide.
-int64_t RowBytes(PixelFormat format, int plane, int width_px) {
+int64_t RowBytes(PixelFormat format, size_t plane, int width_px) {
   if (format == PixelFormat::kRgb8 || format == PixelFormat::kBgr8) return int64_t{3} * width_px;
   if (format == PixelFormat::kI420 && plane > 0) return width_px / 2;
   return width_px;  // Luminance, or interleaved chroma: two bytes for every second pixel.
 }
 
-}  // namespace
+int NumRows(PixelFormat format, size_t plane, int height_px) {
+  return HasSubsampledChroma(format) && plane > 0 ? height_px / 2 : height_px;
+}
 
 Status ImageView::Validate() const {
   const auto invalid = [](std::string message) -> Status {
     return Error{ErrorCode::kInvalidArgument, "ImageView: " + std::move(message)};
   };
-  const int num_planes = NumPlanes(format);
+  const size_t num_planes = static_cast<size_t>(NumPlanes(format));
   if (num_planes == 0) {
     return invalid("format " + std::to_string(static_cast<int>(format)) + " is unknown");
   }
@@ -54,8 +57,8 @@ Status ImageView::Validate() const {
     return invalid("subsampled chroma needs even sizes, not " + std::to_string(width_px) + " x " +
                    std::to_string(height_px));
   }
-  for (int i = 0; i < num_planes; ++i) {
-    const Plane& plane = planes[static_cast<size_t>(i)];
+  for (size_t i = 0; i < num_planes; ++i) {
+    const Plane& plane = planes[i];
     if (plane.data == nullptr) return invalid("planes[" + std::to_string(i) + "].data is null");
     const int64_t row_bytes = RowBytes(format, i, width_px);
     if (plane.row_stride_bytes < row_bytes) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "plumb/base/result.h"
@@ -11,6 +12,12 @@ namespace plumb {
 /// Chroma of kNv12 (U, V), kNv21 (V, U) and kI420 (planes Y, U, V) is subsampled 2 x 2; width and
 /// height must then be even.
 enum class PixelFormat { kGray8, kRgb8, kBgr8, kNv12, kNv21, kI420 };
+
+/// Layout of an image: how many planes, and how many bytes and rows each of them has. `plane` is
+/// below NumPlanes(); sizes are of the whole image [px]. NumPlanes is 0 for an unknown format.
+int NumPlanes(PixelFormat format);
+int64_t RowBytes(PixelFormat format, size_t plane, int width_px);
+int NumRows(PixelFormat format, size_t plane, int height_px);
 
 /// Borrowed: the planes must outlive every call that takes the view.
 struct ImageView {

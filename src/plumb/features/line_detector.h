@@ -26,6 +26,10 @@ class LineDetector {
   /// Segments of the submitted image [px of that image], best score first.
   virtual Result<std::vector<Segment2>> Collect() = 0;
 
+  /// True when Submit() only starts the work and another device does it until Collect(): then it
+  /// pays to submit the next image before the segments of this one are used.
+  virtual bool WorksInBackground() const { return false; }
+
   /// Name for reports: "lsd", "nano", ...
   virtual std::string Name() const = 0;
 

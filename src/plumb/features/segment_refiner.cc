@@ -116,18 +116,24 @@ SegmentRefiner::~SegmentRefiner() = default;
 std::vector<Segment2> SegmentRefiner::Refine(const ImageView& image,
                                              std::span<const Segment2> segments) {
   std::vector<Segment2> refined;
-  if (!image.Validate()) return refined;
+  Refine(image, segments, &refined);
+  return refined;
+}
+
+void SegmentRefiner::Refine(const ImageView& image, std::span<const Segment2> segments,
+                            std::vector<Segment2>* out_segments) {
+  out_segments->clear();
+  if (!image.Validate()) return;
   impl_->SelectCandidates(segments);
-  if (impl_->candidates.empty()) return refined;
+  if (impl_->candidates.empty()) return;
   impl_->blurred.Assign(Luminance(image, &impl_->gray));
   impl_->kept.clear();
-  refined.reserve(impl_->candidates.size());
+  out_segments->reserve(impl_->candidates.size());
   for (Segment2 segment : impl_->candidates) {
     if (!impl_->MoveOnEdge(&segment)) continue;
     if (impl_->options.remove_duplicates && !impl_->KeepUnlessDuplicate(segment)) continue;
-    refined.push_back(segment);
+    out_segments->push_back(segment);
   }
-  return refined;
 }
 
 }  // namespace plumb

@@ -1,0 +1,101 @@
+#include "plumb/runtime/frame_slot.h"
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "plumb/runtime/session.h"
+
+namespace plumb {
+namespace {
+
+// Copies the planes without padding and points `image` at the copy.
+void CopyImage(const ImageView& from, std::vector<uint8_t>* pixels, ImageView* image) {
+  const size_t num_planes = static_cast<size_t>(NumPlanes(from.format));
+  size_t num_bytes = 0;
+  for (size_t i = 0; i < num_planes; ++i) {
+    num_bytes += static_cast<size_t>(RowBytes(from.format, i, from.width_px)) *
+                 static_cast<size_t>(NumRows(from.format, i, from.height_px));
+  }
+  pixels->resize(num_bytes);
+  *image = from;
+  uint8_t* out = pixels->data();
+  for (size_t i = 0; i < num_planes; ++i) {
+    const int64_t row_bytes = RowBytes(from.format, i, from.width_px);
+    image->planes[i] = {out, row_bytes};
+    const uint8_t* in = from.planes[i].data;
+    for (int y = 0; y < NumRows(from.format, i, from.height_px); ++y) {
+      std::memcpy(out, in, static_cast<size_t>(row_bytes));
+      out += row_bytes;
+      in += from.planes[i].row_stride_bytes;
+    }
+  }
+}
+
+}  // namespace
+
+void FrameSlot::Assign(const SessionFrame& frame, int64_t now_ns) {
+  ticket.timestamp_ns = frame.timestamp_ns;
+  ticket.user_tag = frame.user_tag;
+  ticket.prior = frame.prior;
+  ticket.prior.cam_from_world.rotation.normalize();
+  ticket.submitted_ns = now_ns;
+  camera = frame.camera;
+  points.assign(frame.points.begin(), frame.points.end());
+  detection = Ok();
+  detected.clear();
+  release = frame.release;
+  release_user = frame.release_user;
+  if (release != nullptr) {
+    image = frame.image;
+  } else {
+    CopyImage(frame.image, &pixels, &image);
+  }
+}
+
+void FrameSlot::ReleaseImage() {
+  if (auto* callback = std::exchange(release, nullptr)) callback(release_user);
+}
+
+Status ValidateFrame(const SessionFrame& frame) {
+  const auto invalid = [](const std::string& message) -> Status {
+    return Error{ErrorCode::kInvalidArgument, "SessionFrame: " + message};
+  };
+  constexpr double kMaxQuaternionError = 1e-3;
+  if (const Status valid = frame.image.Validate(); !valid) return valid;
+  const Camera& camera = frame.camera;
+  if (!camera.IsValid()) return invalid("camera is not a finite pinhole camera");
+  if (camera.width_px != frame.image.width_px || camera.height_px != frame.image.height_px) {
+    return invalid("camera is for " + std::to_string(camera.width_px) + " x " +
+                   std::to_string(camera.height_px) + " px, the image has " +
+                   std::to_string(frame.image.width_px) + " x " +
+                   std::to_string(frame.image.height_px));
+  }
+  const Rigid3& pose = frame.prior.cam_from_world;
+  if (!pose.IsFinite()) return invalid("prior.cam_from_world is not finite");
+  if (!(std::abs(pose.rotation.norm() - 1.0) < kMaxQuaternionError)) {
+    return invalid("prior.cam_from_world.rotation has norm " +
+                   std::to_string(pose.rotation.norm()) + ", not 1");
+  }
+  const auto is_positive = [](double x) { return std::isfinite(x) && x > 0.0; };
+  if (!is_positive(frame.prior.position_sigma_m)) {
+    return invalid("prior.position_sigma_m " + std::to_string(frame.prior.position_sigma_m) +
+                   " is not positive");
+  }
+  if (!is_positive(frame.prior.rotation_sigma_rad)) {
+    return invalid("prior.rotation_sigma_rad " + std::to_string(frame.prior.rotation_sigma_rad) +
+                   " is not positive");
+  }
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    const PointMatch& point = frame.points[i];
+    if (!point.pixel.allFinite() || !point.point_in_world.allFinite() ||
+        !point.deviation_in_world.allFinite()) {
+      return invalid("points[" + std::to_string(i) + "] is not finite");
+    }
+  }
+  return Ok();
+}
+
+}  // namespace plumb

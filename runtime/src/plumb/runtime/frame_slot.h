@@ -1,0 +1,52 @@
+// One submitted frame on its way through a session, with its own copy of everything.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "plumb/base/result.h"
+#include "plumb/features/image_view.h"
+#include "plumb/geometry/camera.h"
+#include "plumb/geometry/segment.h"
+#include "plumb/runtime/pose_refiner.h"
+
+namespace plumb {
+
+struct SessionFrame;
+
+/// What must be remembered of a frame to report it.
+struct FrameTicket {
+  uint64_t index = 0;
+  int64_t timestamp_ns = 0;
+  uint64_t user_tag = 0;
+  PosePrior prior;
+  int64_t submitted_ns = 0;  // of the session's own clock
+};
+
+/// Slots are recycled: their vectors keep their capacity.
+struct FrameSlot {
+  FrameTicket ticket;
+  Camera camera;
+  std::vector<PointMatch> points;
+  ImageView image;  // of `pixels`, or the host's own planes until they are released
+  std::vector<uint8_t> pixels;
+  void (*release)(void* user) = nullptr;
+  void* release_user = nullptr;
+  std::vector<FrameTicket> dropped_before;  // frames whose place this one took, oldest first
+
+  Status detection = Ok();
+  std::vector<Segment2> detected;
+  int64_t detect_begin_ns = 0, detect_end_ns = 0;
+
+  /// Takes the frame over; copies the image unless it comes with a release callback. `frame` must
+  /// be valid. Leaves `ticket.index` and `dropped_before` alone.
+  void Assign(const SessionFrame& frame, int64_t now_ns);
+
+  /// Gives a borrowed image back, once; does nothing for a copied one.
+  void ReleaseImage();
+};
+
+/// kInvalidArgument naming the first value of the frame that is broken.
+Status ValidateFrame(const SessionFrame& frame);
+
+}  // namespace plumb

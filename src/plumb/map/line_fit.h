@@ -71,8 +71,11 @@ struct FittedLine {
   AnchoredLine line;
   Matrix4d covariance = Matrix4d::Zero();  // of AnchoredLine's delta [m^2]
 
-  /// 3x3 covariance [m^2], rank 2, of the point (1 - a) * start + a * end.
-  Eigen::Matrix3d CovarianceAt(double a) const;
+  /// The same line between the points (1 - a) * start + a * end, a = begin and a = end.
+  FittedLine WithAnchors(double begin, double end) const;
+  /// 3x3 covariances [m^2] of the anchors, rank 2.
+  Eigen::Matrix3d CovarianceOfStart() const;
+  Eigen::Matrix3d CovarianceOfEnd() const;
 };
 
 /// Gauss-Newton from `initial_in_world` with Cauchy weights.

@@ -5,19 +5,12 @@
 #include <vector>
 
 #include "plumb/map/depth_view.h"
+#include "plumb/map/line_association.h"
 #include "plumb/map/line_fit.h"
 #include "plumb/map/line_map.h"
 #include "plumb/map/pnp_filter.h"
 
 namespace plumb {
-
-/// When does a segment belong to a line? All of these must hold.
-struct AssociationGate {
-  double max_sine = 0.0;         // of the angle between segment and projected line
-  double max_distance_px = 0.0;  // of both ends of the overlap from the projected line
-  double min_overlap = 0.0;      // over the length of the shorter one
-  double depth_margin_m = 0.0;   // lifted ends within 3 (depth sigma + margin) of the 3D line
-};
 
 struct LineFusionOptions {
   AssociationGate grow{0.06, 4.0, 0.3, 0.005};    // frame by frame, on unrefined lines

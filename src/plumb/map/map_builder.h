@@ -5,6 +5,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "plumb/base/result.h"
@@ -68,6 +69,7 @@ class MapBuilder {
  private:
   MapBuilderOptions options_;
   std::vector<KeyFrame> key_frames_;
+  std::unordered_set<int64_t> timestamps_;
   MapBuildStats stats_;
 };
 

@@ -1,0 +1,84 @@
+#include "plumb/map/map_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "plumb/map/line_visibility.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kUnitTolerance = 1e-3;  // of a quaternion's norm
+
+Status Validate(const KeyFrameInput& frame) {
+  const auto invalid = [&frame](const std::string& what) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "the key frame at " + std::to_string(frame.timestamp_ns) + " ns: " + what};
+  };
+  if (!frame.camera.IsValid()) return invalid("the camera's intrinsics are invalid");
+  if (!frame.cam_from_world.IsFinite()) return invalid("the pose is not finite");
+  const double norm = frame.cam_from_world.rotation.norm();
+  if (std::abs(norm - 1.0) > kUnitTolerance) {
+    return invalid("the pose's quaternion has a norm of " + std::to_string(norm) + ", not 1");
+  }
+  if (const Status depth = frame.depth.Validate(); !depth) return invalid(depth.error().message);
+  if (frame.depth.width_px != frame.camera.width_px ||
+      frame.depth.height_px != frame.camera.height_px) {
+    const auto size = [](int width, int height) {
+      return std::to_string(width) + " x " + std::to_string(height);
+    };
+    return invalid("the depth image has " + size(frame.depth.width_px, frame.depth.height_px) +
+                   " px, the camera " + size(frame.camera.width_px, frame.camera.height_px));
+  }
+  return Ok();
+}
+
+}  // namespace
+
+MapBuilder::MapBuilder(MapBuilderOptions options) : options_(std::move(options)) {}
+
+Status MapBuilder::AddKeyFrame(KeyFrameInput frame) {
+  if (const Status valid = Validate(frame); !valid) return valid.error();
+  if (!timestamps_.insert(frame.timestamp_ns).second) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "the key frame at " + std::to_string(frame.timestamp_ns) + " ns was added before"};
+  }
+  KeyFrame& added = key_frames_.emplace_back();
+  added.timestamp_ns = frame.timestamp_ns;
+  added.cam_from_world = {frame.cam_from_world.rotation.normalized(),
+                          frame.cam_from_world.translation};
+  added.camera = frame.camera;
+  added.points = std::move(frame.points);
+  const Rigid3 world_from_cam = added.cam_from_world.Inverse();
+  for (const LiftedPart& part :
+       LiftSegments(frame.camera, frame.depth, frame.segments, options_.lift)) {
+    added.segments.push_back(
+        {part.segment_px,
+         {world_from_cam * part.segment_in_cam.start, world_from_cam * part.segment_in_cam.end},
+         std::nullopt});
+  }
+  ++stats_.num_key_frames;
+  stats_.num_segments += frame.segments.size();
+  stats_.num_lifted += added.segments.size();
+  return Ok();
+}
+
+Result<LineMap> MapBuilder::Build(const MapBuildProgress& progress) {
+  if (key_frames_.empty()) {
+    return Error{ErrorCode::kInvalidArgument, "the map has no key frames"};
+  }
+  LineMap map;
+  map.detector = options_.detector;
+  map.key_frames = key_frames_;
+  map.lines = FuseLines(options_.fusion, options_.pnp_filter, &map.key_frames, progress,
+                        &stats_.num_filtered);
+  ComputeVisibility(&map);
+  stats_.num_lines = map.lines.size();
+  stats_.num_multi_view_lines = static_cast<size_t>(
+      std::count_if(map.lines.begin(), map.lines.end(),
+                    [](const MapLine& line) { return line.num_observing > 1; }));
+  return map;
+}
+
+}  // namespace plumb

@@ -6,25 +6,31 @@
 namespace plumb {
 namespace {
 
+constexpr double kRounding = 1e-6;  // of a covariance's entries, relative to the largest
 constexpr double kUnitTolerance = 1e-3;
 constexpr size_t kMaxDetectorBytes = 1024;
 constexpr int kMaxImageSide = 65536;
+constexpr double kMaxCoordinate = 1e7;  // [m] or [px]; also keeps float32 records finite
 
 Error Bad(const std::string& object, size_t index, const std::string& what) {
   return {ErrorCode::kInvalidArgument, object + " " + std::to_string(index) + " " + what};
 }
 
-bool HasLength(const Segment3& segment) {
-  return segment.start.allFinite() && segment.end.allFinite() && segment.Length() > 0.0;
+template <typename Vector>
+bool IsCoordinate(const Vector& x) {
+  return x.allFinite() && x.cwiseAbs().maxCoeff() <= kMaxCoordinate;
 }
 
-bool HasLength(const Segment2& segment) {
-  return segment.start.allFinite() && segment.end.allFinite() && segment.Length() > 0.0;
+template <typename Segment>
+bool HasLength(const Segment& segment) {
+  return IsCoordinate(segment.start) && IsCoordinate(segment.end) && segment.Length() > 0.0;
 }
 
 bool IsCovariance(const Eigen::Matrix3d& matrix) {
-  return matrix.allFinite() && matrix.diagonal().minCoeff() >= 0.0 &&
-         (matrix - matrix.transpose()).cwiseAbs().maxCoeff() <= 1e-6 * matrix.cwiseAbs().maxCoeff();
+  const double largest = matrix.cwiseAbs().maxCoeff();
+  return matrix.allFinite() && largest <= kMaxCoordinate * kMaxCoordinate &&
+         matrix.diagonal().minCoeff() >= -kRounding * largest &&
+         (matrix - matrix.transpose()).cwiseAbs().maxCoeff() <= kRounding * largest;
 }
 
 Status CheckLines(const LineMap& map) {
@@ -69,7 +75,7 @@ Status CheckSightings(const LineMap& map) {
       if (!(std::abs(norm - 1.0f) <= kUnitTolerance)) {
         return Bad("Sighting", k, "has a direction of length " + std::to_string(norm));
       }
-      if (!(sighting.distance_m > 0.0f) || !std::isfinite(sighting.distance_m)) {
+      if (!(sighting.distance_m > 0.0f && sighting.distance_m <= 2 * kMaxCoordinate)) {
         return Bad("Sighting", k,
                    "has a distance of " + std::to_string(sighting.distance_m) + " m");
       }
@@ -94,8 +100,8 @@ Status CheckSegments(const KeyFrame& key_frame, size_t index, size_t num_lines) 
     }
   }
   for (const MapPoint& point : key_frame.points) {
-    if (!point.pixel.allFinite() || !point.point_in_world.allFinite()) {
-      return Bad("Key frame", index, "has a point that is not finite");
+    if (!IsCoordinate(point.pixel) || !IsCoordinate(point.point_in_world)) {
+      return Bad("Key frame", index, "has a point that is not finite or out of range");
     }
   }
   return Ok();
@@ -104,9 +110,10 @@ Status CheckSegments(const KeyFrame& key_frame, size_t index, size_t num_lines) 
 Status CheckKeyFrames(const LineMap& map) {
   for (size_t i = 0; i < map.key_frames.size(); ++i) {
     const KeyFrame& key_frame = map.key_frames[i];
-    if (!key_frame.cam_from_world.IsFinite() ||
+    if (!key_frame.cam_from_world.rotation.coeffs().allFinite() ||
+        !IsCoordinate(key_frame.cam_from_world.translation) ||
         std::abs(key_frame.cam_from_world.rotation.norm() - 1.0) > kUnitTolerance) {
-      return Bad("Key frame", i, "has a pose that is not finite or not a rotation");
+      return Bad("Key frame", i, "has a pose that is not finite, out of range or not a rotation");
     }
     if (!key_frame.camera.IsValid() || key_frame.camera.width_px > kMaxImageSide ||
         key_frame.camera.height_px > kMaxImageSide) {

@@ -6,7 +6,8 @@
 
 namespace plumb {
 
-/// Checks that all numbers are finite and in range and that all references point at something:
+/// Checks that all numbers are finite, coordinates within 1e7 (m, px), and that all references
+/// point at something:
 /// - fused lines, lifted segments and their images have a length; covariances have no negative
 ///   variance; 1 <= num_observing <= num_expected
 /// - sightings: key frames of one line strictly ascending, unit directions, distances > 0

@@ -48,13 +48,15 @@ struct NetworkInfo {
 ///
 /// The network owns its input and output buffer: the image kernel writes input(), the decoder reads
 /// output(). Record() may be called for several recorders, but only one of them may be in flight at
-/// a time, since all share the activations. The device must outlive the network.
+/// a time, since all share the activations. Input and output are device memory
+/// (MemoryUse::kDevice).
 class Network {
  public:
   /// Folds, plans, uploads and builds all pipelines.
   /// @return kInvalidArgument for a bad input size; kUnsupported when the device lacks what the
   /// family needs; device errors otherwise.
-  static Result<std::unique_ptr<Network>> Create(gpu::Device& device, const Model& model,
+  static Result<std::unique_ptr<Network>> Create(std::shared_ptr<gpu::Device> device,
+                                                 const Model& model,
                                                  const NetworkOptions& options = {});
   ~Network();
   Network(const Network&) = delete;
@@ -68,8 +70,10 @@ class Network {
   /// [6][output_height][output_width] fp32: loc logits 2, off logits 2 (x, y), dis 2 (dx, dy).
   const gpu::Buffer& output() const;
 
-  /// Appends every dispatch of a frame: input() -> output().
-  Status Record(gpu::Recorder& recorder) const;
+  /// Appends every dispatch of a frame: input() -> output(); failures surface in
+  /// Recorder::Finish().
+  /// @param stage_per_layer begins a recorder stage for every layer, for profiling.
+  void Record(gpu::Recorder& recorder, bool stage_per_layer = false) const;
 
  private:
   struct Impl;

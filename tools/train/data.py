@@ -109,11 +109,12 @@ class Batches:
     """Endless (epoch, index in epoch, images uint8 [B, S, S, 3], maps float32 [B, 8, S/4, S/4]), prepared by threads.
 
     The content of a batch is a function of (seed, epoch, index) alone, so a resumed run sees what the unbroken one sees.
+    `part` = (i, n) yields only every n-th image from the i-th on: one of n processes that share the batch.
     """
 
-    def __init__(self, samples, batch, size, augmentation, seed=0, epoch=0, index=0, depth=3):
+    def __init__(self, samples, batch, size, augmentation, seed=0, epoch=0, index=0, part=(0, 1), depth=3):
         self.samples, self.batch, self.size, self.augmentation, self.seed = samples, batch, size, augmentation, seed
-        self.per_epoch = max(1, len(samples) // batch)
+        self.part, self.per_epoch = part, max(1, len(samples) // batch)
         self._queue = queue.Queue(depth)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(epoch, index), daemon=True)
@@ -121,7 +122,8 @@ class Batches:
 
     def make(self, epoch, index):
         order = np.random.default_rng((self.seed, epoch)).permutation(len(self.samples))
-        chosen = order[index * self.batch : (index + 1) * self.batch]
+        part, parts = self.part
+        chosen = order[index * self.batch : (index + 1) * self.batch][part::parts]
         pairs = [
             render(self.samples[i], self.size, np.random.default_rng((self.seed, epoch, int(i))), self.augmentation)
             for i in chosen

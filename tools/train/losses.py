@@ -2,7 +2,7 @@
 import torch
 import torch.nn.functional as F
 
-POSITIVE_WEIGHT = 5.0  # of cells that hold a midpoint, against the ~95 % that do not
+POSITIVE_WEIGHT = 10.0  # of a sure midpoint's cell against an empty one, of which there are 50 times more
 
 
 def sign_invariant(predicted, target):
@@ -11,8 +11,8 @@ def sign_invariant(predicted, target):
 
 
 def soft_bce(logit, target, positive_weight):
-    """Mean cross entropy against soft targets; cells with a target above zero count `positive_weight` times."""
-    weight = 1 + (positive_weight - 1) * (target > 0).to(logit.dtype)
+    """Mean cross entropy against soft targets; a cell's weight grows with its target, to `positive_weight` at 1."""
+    weight = 1 + (positive_weight - 1) * target
     return (F.binary_cross_entropy_with_logits(logit, target, reduction="none") * weight).mean()
 
 

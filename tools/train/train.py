@@ -1,6 +1,7 @@
 """Trains the VLSE network; see README.md. Constant learning rate with averaged weights, a short decay phase to finish.
 
 usage: train.py --data DIR --out DIR [--preset nano] [--start-from STATE [--decay-epochs N]]   (--out with a state.pt resumes)
+Several processes share a batch when RANK, WORLD_SIZE, MASTER_ADDR and MASTER_PORT say so (torchrun sets them).
 """
 import argparse
 import json
@@ -30,7 +31,7 @@ def parse_arguments(argv=None):
     parser.add_argument("--size", type=int, default=320, help="input edge in pixels, divisible by 64")
     parser.add_argument("--evaluate-size", type=int, default=320)
     parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--optimizer", choices=("adamw", "muon"), default="muon")
+    parser.add_argument("--optimizer", choices=("adamw", "muon"), default="adamw")
     parser.add_argument("--lr", type=float, default=2e-3)
     parser.add_argument("--weight-decay", type=float, default=0.05)
     parser.add_argument("--warmup-steps", type=int, default=200)
@@ -90,11 +91,32 @@ def make_optimizers(model, args):
     return optimizers
 
 
+class Team:
+    """The processes that share each batch: sums gradients, and stops all of them at the same step."""
+
+    def __init__(self):
+        self.size, self.rank = int(os.environ.get("WORLD_SIZE", 1)), int(os.environ.get("RANK", 0))
+        if self.size > 1:
+            torch.distributed.init_process_group("gloo")
+
+    def share(self, params, stop):
+        """Averages the gradients of `params` over the team; true if any process wants to stop."""
+        if self.size == 1:
+            return stop
+        grads = [p.grad for p in params]
+        flat = torch.cat([g.flatten() for g in grads] + [torch.full((1,), float(stop), device=grads[0].device)])
+        torch.distributed.all_reduce(flat)
+        parts = flat.split([g.numel() for g in grads] + [1])
+        for grad, part in zip(grads, parts):
+            grad.copy_(part.view_as(grad) / self.size)
+        return bool(parts[-1] > 0)
+
+
 class Run:
     """Everything that a checkpoint holds, and the loop's one step."""
 
-    def __init__(self, args):
-        self.args = args
+    def __init__(self, args, team):
+        self.args, self.team = args, team
         torch.manual_seed(args.seed)
         self.device = torch.device(args.device)
         self.model = build(args.preset).to(self.device, memory_format=torch.channels_last)
@@ -142,7 +164,8 @@ class Run:
             rate *= max(0.0, 1 - done)
         return rate * self.args.lr
 
-    def train_step(self, images, maps, rate):
+    def train_step(self, images, maps, rate, stop):
+        """One step at learning rate `rate`: (loss terms, whether the team stops)."""
         self.model.train()
         x = evaluate.to_tensor(images).to(self.device)
         target = torch.from_numpy(maps).to(self.device)
@@ -153,6 +176,7 @@ class Run:
         for optimizer in self.optimizers:
             optimizer.zero_grad(set_to_none=True)
         loss.backward()
+        stop = self.team.share(list(self.model.parameters()), stop)
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), 20.0)
         for optimizer in self.optimizers:
             for group in optimizer.param_groups:
@@ -160,8 +184,8 @@ class Run:
             optimizer.step()
         self.average.update()
         self.step += 1
-        self.images += len(images)
-        return {"loss": float(loss.detach()), **terms}
+        self.images += len(images) * self.team.size
+        return {"loss": float(loss.detach()), **terms}, stop
 
     def averaged_model(self):
         model = build(self.args.preset)
@@ -185,14 +209,16 @@ def main(argv=None):
     torch.set_num_threads(args.threads)
     os.makedirs(args.out, exist_ok=True)
     path = os.path.join(args.out, "state.pt")
-    run = Run(args)
+    team = Team()
+    lead = team.rank == 0
+    run = Run(args, team)
     if os.path.exists(path):
         run.restore(path)
     elif args.start_from:
         run.restore(args.start_from)
     training, validation = split(load(args.data, limit=args.limit))
     annotated = evaluate.load_annotated(args.evaluate) if args.evaluate else []
-    batches = Batches(training, args.batch, args.size, TRAINING, args.seed, run.epoch, run.index)
+    batches = Batches(training, args.batch, args.size, TRAINING, args.seed, run.epoch, run.index, (team.rank, team.size))
     if args.decay_epochs and run.decay_start is None:
         run.decay_start = run.progress(batches.per_epoch)
     end = run.decay_start + args.decay_epochs if args.decay_epochs else args.epochs
@@ -200,7 +226,7 @@ def main(argv=None):
     stopped = []
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopped.append(True))
-    log = open(os.path.join(args.out, "log.jsonl"), "a", buffering=1)
+    log = open(os.path.join(args.out, "log.jsonl") if lead else os.devnull, "a", buffering=1)
     started = before = time.monotonic()
     saved = watched = logged = started
     sums, count = {}, 0
@@ -210,10 +236,12 @@ def main(argv=None):
                "epoch": round(run.progress(batches.per_epoch), 2), "lr": round(run.learning_rate(batches.per_epoch), 6), **more}
         log.write(json.dumps(row) + "\n")
 
-    while not stopped and run.progress(batches.per_epoch) < end and time.monotonic() - started < 60 * args.minutes:
+    stop = False
+    while not stop and run.progress(batches.per_epoch) < end:
         epoch, index, images, maps = batches.next()
         run.epoch, run.index = epoch, index
-        terms = run.train_step(images, maps, run.learning_rate(batches.per_epoch))
+        stop = bool(stopped) or time.monotonic() - started > 60 * args.minutes
+        terms, stop = run.train_step(images, maps, run.learning_rate(batches.per_epoch), stop)
         run.index += 1
         if not np.isfinite(terms["loss"]):
             raise RuntimeError(f"the loss is {terms['loss']} at step {run.step}; the last saved state is unharmed")
@@ -225,14 +253,15 @@ def main(argv=None):
         if now - logged > 60:
             write_log(**{k: round(v / count, 4) for k, v in sums.items()}, ms_per_image=round((now - logged) / count / args.batch * 1e3, 1))
             sums, count, logged = {}, 0, now
-        if now - saved > 60 * args.save_minutes:
+        if lead and now - saved > 60 * args.save_minutes:
             run.save(path)
             saved = now
-        if now - watched > 60 * args.evaluate_minutes:
+        if lead and now - watched > 60 * args.evaluate_minutes:
             write_log(**watch(run, args, validation, annotated))
             watched = time.monotonic()
-    run.save(path)
-    write_log(**watch(run, args, validation, annotated), end="signal" if stopped else "done")
+    if lead:
+        run.save(path)
+        write_log(**watch(run, args, validation, annotated), end="signal" if stopped else "done")
     batches.close()
 
 

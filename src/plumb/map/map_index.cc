@@ -1,0 +1,198 @@
+#include "plumb/map/map_index.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "plumb/geometry/line_projection.h"
+#include "plumb/map/box_tree.h"
+
+namespace plumb {
+namespace {
+
+/// Where a camera with an enlarged image can see: planes with normal . x + offset >= 0 inside.
+/// Rounding is taken care of by `slack`, so that nothing that ProjectSegment() shows is lost.
+class Frustum {
+ public:
+  Frustum(const Camera& camera, const Rigid3& cam_from_world, double margin_px) {
+    const double right = camera.width_px - 1 + margin_px, bottom = camera.height_px - 1 + margin_px;
+    // fx x / z + cx >= -margin for z > 0, and so on.
+    const std::array<Eigen::Vector3d, 5> normals_in_cam = {
+        Eigen::Vector3d(camera.fx, 0.0, camera.cx + margin_px),
+        Eigen::Vector3d(-camera.fx, 0.0, right - camera.cx),
+        Eigen::Vector3d(0.0, camera.fy, camera.cy + margin_px),
+        Eigen::Vector3d(0.0, -camera.fy, bottom - camera.cy),
+        Eigen::Vector3d(0.0, 0.0, 1.0),
+    };
+    const Eigen::Matrix3d world_from_cam = cam_from_world.RotationMatrix().transpose();
+    for (size_t i = 0; i < normals_.size(); ++i) {
+      const Eigen::Vector3d normal = normals_in_cam[i].normalized();
+      normals_[i] = world_from_cam * normal;
+      offsets_[i] = normal.dot(cam_from_world.translation);
+    }
+    offsets_.back() -= kNearPlane;
+    slack_ = 1e-9 * (1.0 + cam_from_world.translation.norm());
+  }
+
+  bool MayContain(const Box& box) const {
+    for (size_t i = 0; i < normals_.size(); ++i) {
+      if (box.Support(normals_[i]) + offsets_[i] < -slack_) return false;
+    }
+    return true;
+  }
+
+ private:
+  std::array<Eigen::Vector3d, 5> normals_;
+  std::array<double, 5> offsets_ = {};
+  double slack_ = 0.0;
+};
+
+std::vector<Box> BoxesOf(const std::vector<MapLine>& lines) {
+  std::vector<Box> boxes;
+  boxes.reserve(lines.size());
+  for (const MapLine& line : lines) {
+    const Segment3& segment = line.segment_in_world;
+    boxes.push_back({segment.start.cwiseMin(segment.end), segment.start.cwiseMax(segment.end)});
+  }
+  return boxes;
+}
+
+std::vector<Box> CentersOf(const std::vector<KeyFrame>& key_frames) {
+  std::vector<Box> boxes;
+  boxes.reserve(key_frames.size());
+  for (const KeyFrame& key_frame : key_frames) {
+    const Eigen::Vector3d center = key_frame.cam_from_world.Center();
+    boxes.push_back({center, center});
+  }
+  return boxes;
+}
+
+Eigen::Vector3d OpticalAxis(const Rigid3& cam_from_world) {
+  return cam_from_world.RotationMatrix().row(2);
+}
+
+/// Ties break by index, as pairs compare.
+using RankedKeyFrame = std::pair<double, uint32_t>;
+
+}  // namespace
+
+struct MapIndex::Impl {
+  explicit Impl(const LineMap& borrowed)
+      : map(borrowed), lines(BoxesOf(borrowed.lines)), key_frames(CentersOf(borrowed.key_frames)) {
+    // The longest view of each node's lines bounds how far away they can count as visible.
+    reach_m.resize(lines.nodes().size());
+    for (size_t i = 0; i < reach_m.size(); ++i) {
+      const BoxTree::Node& node = lines.nodes()[i];
+      for (uint32_t k = node.begin; k < node.end; ++k) {
+        for (const LineSighting& sighting : map.SightingsOf(lines.order()[k])) {
+          reach_m[i] = std::max(reach_m[i], static_cast<double>(sighting.distance_m));
+        }
+      }
+    }
+    for (const KeyFrame& key_frame : map.key_frames) {
+      axes.push_back(OpticalAxis(key_frame.cam_from_world));
+      centers.push_back(key_frame.cam_from_world.Center());
+    }
+  }
+
+  /// The `count` nearest, nearest first. The work space lives as long as the thread.
+  const std::vector<RankedKeyFrame>& Nearest(const Rigid3& cam_from_world, size_t count) const {
+    thread_local std::vector<RankedKeyFrame> best;  // a heap, the worst of the best in front
+    best.clear();
+    if (count == 0) return best;
+    const Eigen::Vector3d center = cam_from_world.Center(), axis = OpticalAxis(cam_from_world);
+    key_frames.ForEachNearestFirst(
+        center,
+        [&](double distance) { return best.size() < count || distance <= best.front().first; },
+        [&](uint32_t k) {
+          const double cosine = std::clamp(axes[k].dot(axis), -1.0, 1.0);
+          const RankedKeyFrame ranked((centers[k] - center).norm() + std::acos(cosine), k);
+          if (best.size() == count) {
+            if (!(ranked < best.front())) return;
+            std::pop_heap(best.begin(), best.end());
+            best.pop_back();
+          }
+          best.push_back(ranked);
+          std::push_heap(best.begin(), best.end());
+        });
+    std::sort_heap(best.begin(), best.end());
+    return best;
+  }
+
+  const LineMap& map;
+  BoxTree lines, key_frames;
+  std::vector<double> reach_m;  // a node of `lines`
+  std::vector<Eigen::Vector3d> axes, centers;
+};
+
+MapIndex::MapIndex(const LineMap& map) : impl_(std::make_unique<Impl>(map)) {}
+MapIndex::~MapIndex() = default;
+MapIndex::MapIndex(MapIndex&&) noexcept = default;
+MapIndex& MapIndex::operator=(MapIndex&&) noexcept = default;
+
+const LineMap& MapIndex::map() const { return impl_->map; }
+
+void MapIndex::VisibleLines(const Camera& camera, const Rigid3& cam_from_world,
+                            const VisibilityOptions& options,
+                            std::vector<uint32_t>* out_lines) const {
+  out_lines->clear();
+  if (!camera.IsValid() || !cam_from_world.IsFinite()) return;
+  const LineMap& map = impl_->map;
+  const Frustum frustum(camera, cam_from_world, options.margin_px);
+  const Eigen::Vector3d center = cam_from_world.Center();
+  const double min_cosine =
+      options.max_view_angle_rad < std::numbers::pi ? std::cos(options.max_view_angle_rad) : -2.0;
+  const double max_ratio = options.max_distance_ratio;
+  const bool only_near = options.nearest_key_frames > 0;
+
+  // Sorted by index, to look key frames up.
+  thread_local std::vector<uint32_t> near;
+  near.clear();
+  if (only_near) {
+    for (const auto& [cost, k] : impl_->Nearest(cam_from_world, options.nearest_key_frames)) {
+      near.push_back(k);
+    }
+    std::sort(near.begin(), near.end());
+  }
+
+  const auto is_seen_alike = [&](uint32_t line) {
+    const Eigen::Vector3d ray = center - map.lines[line].segment_in_world.Midpoint();
+    const double distance = ray.norm();
+    for (const LineSighting& sighting : map.SightingsOf(line)) {
+      const double seen_from = static_cast<double>(sighting.distance_m);
+      if (distance < max_ratio * seen_from && seen_from < max_ratio * distance &&
+          sighting.direction_to_camera.cast<double>().dot(ray) > min_cosine * distance &&
+          (!only_near || std::binary_search(near.begin(), near.end(), sighting.key_frame))) {
+        return true;
+      }
+    }
+    return false;
+  };
+  impl_->lines.ForEach(
+      [&](uint32_t node) {
+        const Box& box = impl_->lines.nodes()[node].box;
+        return box.DistanceTo(center) <= max_ratio * impl_->reach_m[node] &&
+               frustum.MayContain(box);
+      },
+      [&](uint32_t line) {
+        const MapLine& candidate = map.lines[line];
+        if (candidate.num_observing < options.min_observing || !is_seen_alike(line)) return;
+        const auto visible =
+            ProjectSegment(camera, cam_from_world, candidate.segment_in_world, options.margin_px);
+        if (visible && visible->Length() >= options.min_length_px) out_lines->push_back(line);
+      });
+  std::sort(out_lines->begin(), out_lines->end());
+}
+
+void MapIndex::NearestKeyFrames(const Rigid3& cam_from_world, uint32_t count,
+                                std::vector<uint32_t>* out_key_frames) const {
+  out_key_frames->clear();
+  if (!cam_from_world.IsFinite()) return;
+  for (const auto& [cost, k] : impl_->Nearest(cam_from_world, count)) {
+    out_key_frames->push_back(k);
+  }
+}
+
+}  // namespace plumb

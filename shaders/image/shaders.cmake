@@ -1,6 +1,3 @@
 # Image preprocessing; names are image/<file>_<kernel family>.
-foreach(family IN ITEMS cpu_simd:1 gpu:0)
-  string(REGEX MATCH "(.*):(.*)" _ ${family})
-  plumb_add_shader(image/preprocess_${CMAKE_MATCH_1} image/preprocess.comp
-    DEFINES PLUMB_CPU_SIMD=${CMAKE_MATCH_2})
-endforeach()
+plumb_add_shader(image/preprocess_cpu_simd image/preprocess.comp DEFINES PLUMB_CPU_SIMD=1)
+plumb_add_shader(image/preprocess_gpu image/preprocess.comp DEFINES PLUMB_CPU_SIMD=0)

@@ -29,8 +29,8 @@ class SegmentsByAngle {
  public:
   explicit SegmentsByAngle(std::span<const Segment2> segments_px);
 
-  /// Appends every pair that passes the gate in the image (the depth is not looked at), by
-  /// ascending line; the order of one line's segments is fixed, but not by index.
+  /// Appends every segment that passes the gate in the image (depth is not looked at). Their order
+  /// is fixed, but not by index.
   void AppendCandidates(const ProjectedLine& line, const AssociationGate& gate,
                         std::vector<AssociationCandidate>* out_candidates) const;
 

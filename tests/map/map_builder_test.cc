@@ -1,0 +1,341 @@
+// Maps built from synthetic posed RGB-D frames of a room with drawn lines.
+#include "plumb/map/map_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "map/rendered_depth.h"
+#include "plumb/geometry/line_projection.h"
+
+namespace plumb {
+namespace {
+
+constexpr Camera kCamera{260.0, 262.0, 159.5, 119.5, 320, 240};
+const double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+struct Scene {
+  std::vector<Patch> patches;
+  std::vector<Segment3> lines;
+};
+
+// A wall at z = 3 m and a slanted board in front of it. Lines 0 and 1 are parallel, 3 cm apart.
+Scene Room() {
+  Scene scene;
+  scene.patches = {{{-4, -3, 3}, {8, 0, 0}, {0, 6, 0}},
+                   {{0.4, -0.6, 2.0}, {0.9, 0, 0.3}, {0, 1.2, 0}}};
+  scene.lines = {{{-1.2, -0.4, 3}, {0.1, -0.4, 3}},        {{-1.2, -0.37, 3}, {0.1, -0.37, 3}},
+                 {{-1.0, 0.9, 3}, {-0.2, -0.1, 3}},        {{-0.9, -0.9, 3}, {-0.9, 0.6, 3}},
+                 {{0.4, -0.6, 2.0}, {0.4, 0.6, 2.0}},         // the board's edge
+                 {{0.5, -0.4, 2.0333}, {1.1, 0.4, 2.2333}}};  // drawn on it
+  return scene;
+}
+
+std::vector<Rigid3> Path(int count) {
+  std::vector<Rigid3> poses;
+  for (int k = 0; k < count; ++k) {
+    const double s = count > 1 ? 2.0 * k / (count - 1) - 1.0 : 0.0;  // -1 .. 1
+    const Rigid3 world_from_cam{ExpSo3({0.03 * s, -0.12 * s, 0.05 * s}),
+                                {0.5 * s, 0.1 * s, 0.1 * s}};
+    poses.push_back(world_from_cam.Inverse());
+  }
+  return poses;
+}
+
+struct Recording {
+  std::vector<DepthImage> depth;
+  std::vector<std::vector<Segment2>> segments;
+  std::vector<KeyFrameInput> frames;
+};
+
+Recording Record(const Scene& scene, const std::vector<Rigid3>& poses, double noise_px,
+                 const Camera& camera = kCamera) {
+  std::mt19937 random(17);
+  std::normal_distribution<double> normal;
+  Recording recording;
+  for (const Rigid3& pose : poses) {
+    recording.depth.push_back(RenderDepth(camera, pose, scene.patches));
+    std::vector<Segment2>& segments = recording.segments.emplace_back();
+    for (const Segment3& line : scene.lines) {
+      auto segment = ProjectSegment(camera, pose, line);
+      if (!segment) continue;
+      for (Eigen::Vector2d* end : {&segment->start, &segment->end}) {
+        *end += noise_px * Eigen::Vector2d(normal(random), normal(random));
+      }
+      segments.push_back(*segment);
+    }
+  }
+  for (size_t k = 0; k < poses.size(); ++k) {
+    KeyFrameInput& frame = recording.frames.emplace_back();
+    frame.timestamp_ns = 1000 + static_cast<int64_t>(k);
+    frame.cam_from_world = poses[k];
+    frame.camera = camera;
+    frame.segments = recording.segments[k];
+    frame.depth = recording.depth[k].View();
+  }
+  return recording;
+}
+
+LineMap BuildMap(const Recording& recording, const MapBuilderOptions& options = {}) {
+  MapBuilder builder(options);
+  for (const KeyFrameInput& frame : recording.frames) {
+    const Status added = builder.AddKeyFrame(frame);
+    EXPECT_TRUE(added.has_value()) << added.error().message;
+  }
+  Result<LineMap> map = builder.Build();
+  EXPECT_TRUE(map.has_value());
+  return std::move(*map);
+}
+
+double DistanceFromLine(const Segment3& line, const Eigen::Vector3d& x) {
+  return line.Delta().normalized().cross(x - line.start).norm();
+}
+
+// The map line that lies on a line of the scene, if exactly one does.
+const MapLine* Find(const LineMap& map, const Segment3& truth, double tolerance_m) {
+  const MapLine* found = nullptr;
+  for (const MapLine& line : map.lines) {
+    if (DistanceFromLine(truth, line.segment_in_world.start) > tolerance_m ||
+        DistanceFromLine(truth, line.segment_in_world.end) > tolerance_m) {
+      continue;
+    }
+    if (found != nullptr) return nullptr;
+    found = &line;
+  }
+  return found;
+}
+
+void ExpectConsistent(const LineMap& map) {
+  ASSERT_EQ(map.sighting_begin.size(), map.lines.size() + 1);
+  ASSERT_EQ(map.sighting_begin.back(), map.sightings.size());
+  for (uint32_t i = 0; i < map.lines.size(); ++i) {
+    const MapLine& line = map.lines[i];
+    const auto sightings = map.SightingsOf(i);
+    EXPECT_EQ(sightings.size(), line.num_observing);
+    EXPECT_GE(line.num_expected, line.num_observing);
+    EXPECT_LE(line.num_expected, map.key_frames.size());
+    for (size_t k = 0; k < sightings.size(); ++k) {
+      if (k > 0) {
+        EXPECT_LT(sightings[k - 1].key_frame, sightings[k].key_frame);
+      }
+      const KeyFrame& frame = map.key_frames[sightings[k].key_frame];
+      EXPECT_TRUE(std::any_of(frame.segments.begin(), frame.segments.end(),
+                              [i](const LiftedSegment& s) { return s.line == i; }));
+      const Eigen::Vector3d camera =
+          line.segment_in_world.Midpoint() +
+          sightings[k].distance_m * sightings[k].direction_to_camera.cast<double>();
+      EXPECT_LT((camera - frame.cam_from_world.Center()).norm(), 1e-5);
+      EXPECT_NEAR(sightings[k].direction_to_camera.norm(), 1.0f, 1e-5f);
+    }
+  }
+  for (const KeyFrame& frame : map.key_frames) {
+    for (const LiftedSegment& segment : frame.segments) {
+      EXPECT_TRUE(!segment.line || *segment.line < map.lines.size());
+    }
+  }
+}
+
+TEST(MapBuilder, FusesEachLineOverAllViews) {
+  const Scene scene = Room();
+  const LineMap map = BuildMap(Record(scene, Path(7), 0.3));
+  EXPECT_EQ(map.lines.size(), scene.lines.size());
+  for (const Segment3& truth : scene.lines) {
+    const MapLine* line = Find(map, truth, 0.01);
+    ASSERT_NE(line, nullptr);
+    EXPECT_EQ(line->num_observing, 7u);
+    EXPECT_EQ(line->num_expected, 7u);
+    EXPECT_GT(line->segment_in_world.Length(), 0.8 * truth.Length());
+    EXPECT_LT(line->segment_in_world.Length(), 1.1 * truth.Length());
+  }
+  ExpectConsistent(map);
+}
+
+TEST(MapBuilder, ParallelLinesThreeCentimetresApartStayApart) {
+  const Scene scene = Room();
+  const LineMap map = BuildMap(Record(scene, Path(7), 0.3));
+  const MapLine* upper = Find(map, scene.lines[0], 0.008);
+  const MapLine* lower = Find(map, scene.lines[1], 0.008);
+  ASSERT_NE(upper, nullptr);
+  ASSERT_NE(lower, nullptr);
+  EXPECT_NEAR(lower->segment_in_world.Midpoint().y() - upper->segment_in_world.Midpoint().y(), 0.03,
+              0.005);
+}
+
+TEST(MapBuilder, FragmentsOfOneFrameJoinTheSameLine) {
+  Recording recording = Record(Room(), Path(5), 0.0);
+  const Segment2 whole = recording.segments[2][3];
+  recording.segments[2][3] = {whole.start, whole.start + 0.45 * whole.Delta()};
+  recording.segments[2].push_back({whole.start + 0.55 * whole.Delta(), whole.end});
+  recording.frames[2].segments = recording.segments[2];
+  const LineMap map = BuildMap(recording);
+  EXPECT_EQ(map.lines.size(), Room().lines.size());
+  ASSERT_EQ(map.key_frames[2].segments.size(), 7u);
+  ASSERT_TRUE(map.key_frames[2].segments[3].line);
+  EXPECT_EQ(map.key_frames[2].segments[3].line, map.key_frames[2].segments[6].line);
+  EXPECT_EQ(map.lines[*map.key_frames[2].segments[3].line].num_observing, 5u);
+  ExpectConsistent(map);
+}
+
+TEST(MapBuilder, ALineThatAFrameMissesIsExpectedThere) {
+  Recording recording = Record(Room(), Path(5), 0.0);
+  recording.segments[1].erase(recording.segments[1].begin() + 2);
+  recording.frames[1].segments = recording.segments[1];
+  const LineMap map = BuildMap(recording);
+  const MapLine* line = Find(map, Room().lines[2], 0.01);
+  ASSERT_NE(line, nullptr);
+  EXPECT_EQ(line->num_observing, 4u);
+  EXPECT_EQ(line->num_expected, 5u);
+  ExpectConsistent(map);
+}
+
+TEST(MapBuilder, LinesOfOneViewAreKept) {
+  const LineMap map = BuildMap(Record(Room(), Path(1), 0.0));
+  EXPECT_EQ(map.lines.size(), Room().lines.size());
+  for (const MapLine& line : map.lines) EXPECT_EQ(line.num_observing, 1u);
+  ExpectConsistent(map);
+}
+
+TEST(MapBuilder, ErrorsAreAsLargeAsTheCovarianceSays) {
+  const Scene scene = Room();
+  const LineMap map = BuildMap(Record(scene, Path(9), 0.7));
+  for (const Segment3& truth : scene.lines) {
+    const MapLine* line = Find(map, truth, 0.02);
+    ASSERT_NE(line, nullptr);
+    const double sigma = std::sqrt(line->covariance_start.trace());
+    EXPECT_GT(sigma, 1e-4);
+    EXPECT_LT(sigma, 2e-2);  // one view alone: 4e-2
+    EXPECT_LT(DistanceFromLine(truth, line->segment_in_world.start), 4.0 * sigma);
+  }
+}
+
+TEST(MapBuilder, MirroredCameraGivesTheSameLines) {
+  Camera mirrored = kCamera;
+  mirrored.fy = -mirrored.fy;
+  const Scene scene = Room();
+  const LineMap map = BuildMap(Record(scene, Path(5), 0.2, mirrored));
+  for (const Segment3& truth : scene.lines) EXPECT_NE(Find(map, truth, 0.01), nullptr);
+}
+
+TEST(MapBuilder, FilterRejectsAnObservationAtTheWrongPlace) {
+  Recording recording = Record(Room(), Path(7), 0.2);
+  // Near enough to be associated while lines are young, too far for the other views to agree.
+  recording.segments[3][3].start.x() += 2.2;
+  recording.segments[3][3].end.x() += 2.2;
+  MapBuilderOptions off, on;
+  off.pnp_filter.enabled = false;
+  on.pnp_filter.enabled = true;
+  on.pnp_filter.threshold_px = 1.5;
+  on.pnp_filter.min_inliers = 6;
+  const LineMap without = BuildMap(recording, off), with = BuildMap(recording, on);
+  ASSERT_EQ(without.key_frames[3].segments.size(), with.key_frames[3].segments.size());
+  EXPECT_TRUE(without.key_frames[3].segments[3].line);
+  EXPECT_FALSE(with.key_frames[3].segments[3].line);
+  ExpectConsistent(with);
+}
+
+TEST(MapBuilder, EqualInputsGiveEqualMaps) {
+  const Recording recording = Record(Room(), Path(6), 0.5);
+  const LineMap a = BuildMap(recording), b = BuildMap(recording);
+  ASSERT_EQ(a.lines.size(), b.lines.size());
+  for (size_t i = 0; i < a.lines.size(); ++i) {
+    EXPECT_EQ(a.lines[i].segment_in_world.start, b.lines[i].segment_in_world.start);
+    EXPECT_EQ(a.lines[i].segment_in_world.end, b.lines[i].segment_in_world.end);
+    EXPECT_EQ(a.lines[i].covariance_start, b.lines[i].covariance_start);
+  }
+}
+
+TEST(MapBuilder, BuildsAgainAfterMoreFrames) {
+  const Recording recording = Record(Room(), Path(6), 0.3);
+  MapBuilder builder;
+  for (size_t k = 0; k < 3; ++k) ASSERT_TRUE(builder.AddKeyFrame(recording.frames[k]).has_value());
+  ASSERT_TRUE(builder.Build().has_value());
+  for (size_t k = 3; k < 6; ++k) ASSERT_TRUE(builder.AddKeyFrame(recording.frames[k]).has_value());
+  const Result<LineMap> map = builder.Build();
+  ASSERT_TRUE(map.has_value());
+  EXPECT_EQ(map->key_frames.size(), 6u);
+  EXPECT_EQ(map->lines.size(), Room().lines.size());
+  EXPECT_EQ(builder.stats().num_key_frames, 6u);
+  EXPECT_EQ(builder.stats().num_segments, 36u);
+  EXPECT_EQ(builder.stats().num_lifted, 36u);
+  EXPECT_EQ(builder.stats().num_multi_view_lines, 6u);
+}
+
+TEST(MapBuilder, KeepsWhatTheCallerAttaches) {
+  Recording recording = Record(Room(), Path(2), 0.0);
+  recording.frames[1].points.resize(3);
+  recording.frames[1].points[2].pixel = {4.0f, 5.0f};
+  MapBuilderOptions options;
+  options.detector = "lsd";
+  const LineMap map = BuildMap(recording, options);
+  EXPECT_EQ(map.detector, "lsd");
+  EXPECT_TRUE(map.key_frames[0].points.empty());
+  ASSERT_EQ(map.key_frames[1].points.size(), 3u);
+  EXPECT_EQ(map.key_frames[1].points[2].pixel.y(), 5.0f);
+  EXPECT_EQ(map.key_frames[1].timestamp_ns, 1001);
+}
+
+TEST(MapBuilder, ProgressAscendsToOne) {
+  const Recording recording = Record(Room(), Path(4), 0.0);
+  MapBuilder builder;
+  for (const KeyFrameInput& frame : recording.frames) {
+    ASSERT_TRUE(builder.AddKeyFrame(frame).has_value());
+  }
+  std::vector<double> progress;
+  ASSERT_TRUE(builder.Build([&progress](double done) { progress.push_back(done); }).has_value());
+  ASSERT_GT(progress.size(), 4u);
+  EXPECT_TRUE(std::is_sorted(progress.begin(), progress.end()));
+  EXPECT_GE(progress.front(), 0.0);
+  EXPECT_EQ(progress.back(), 1.0);
+}
+
+TEST(MapBuilder, FramesWithoutSegmentsAreFine) {
+  Recording recording = Record(Room(), Path(3), 0.0);
+  for (KeyFrameInput& frame : recording.frames) frame.segments = {};
+  const LineMap map = BuildMap(recording);
+  EXPECT_TRUE(map.lines.empty());
+  EXPECT_EQ(map.key_frames.size(), 3u);
+  ExpectConsistent(map);
+}
+
+TEST(MapBuilder, RefusesABrokenFrameByName) {
+  const Recording recording = Record(Room(), Path(1), 0.0);
+  MapBuilder builder;
+  const auto message = [&](auto change) {
+    KeyFrameInput frame = recording.frames[0];
+    change(frame);
+    const Status status = builder.AddKeyFrame(frame);
+    if (status.has_value()) return std::string("accepted");
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_NE(status.error().message.find("1000 ns"), std::string::npos) << status.error().message;
+    return status.error().message;
+  };
+  using F = KeyFrameInput;
+  const auto has = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
+  EXPECT_TRUE(has(message([](F& f) { f.cam_from_world.translation.x() = kNaN; }), "pose"));
+  EXPECT_TRUE(has(message([](F& f) { f.cam_from_world.rotation.w() = kNaN; }), "pose"));
+  EXPECT_TRUE(has(message([](F& f) { f.cam_from_world.rotation.coeffs() *= 2.0; }), "quaternion"));
+  EXPECT_TRUE(has(message([](F& f) { f.camera.fx = 0.0; }), "intrinsics"));
+  EXPECT_TRUE(has(message([](F& f) { f.depth = {}; }), "no data"));
+  EXPECT_TRUE(has(message([](F& f) { f.camera.width_px = 640; }), "320 x 240 px, the camera 640"));
+  EXPECT_EQ(builder.stats().num_key_frames, 0u);
+
+  EXPECT_EQ(message([](F&) {}), "accepted");
+  EXPECT_TRUE(has(message([](F&) {}), "added before"));
+  EXPECT_EQ(builder.stats().num_key_frames, 1u);
+}
+
+TEST(MapBuilder, RefusesToBuildWithoutFrames) {
+  const Result<LineMap> map = MapBuilder().Build();
+  ASSERT_FALSE(map.has_value());
+  EXPECT_EQ(map.error().code, ErrorCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,148 @@
+// plumbline eval trajectory: error of a replay's poses against the truth and against the priors.
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tools/datasets/text_file.h"
+#include "tools/datasets/timestamp.h"
+#include "tools/datasets/trajectory.h"
+#include "tools/metrics/trajectory_error.h"
+#include "tools/plumbline/commands.h"
+#include "tools/plumbline/json_report.h"
+
+namespace plumb::tools {
+namespace {
+
+/// Two timestamps within it name the same frame.
+constexpr int64_t kSameFrameNs = 1'000'000;
+
+struct EvalTrajectoryOptions {
+  std::string run, truth, priors;
+  bool json = false;
+};
+
+struct MatchedPoses {
+  std::vector<FrameEvaluation> frames;
+  size_t num_missing = 0;        // priors without a refined pose: count as their prior
+  size_t num_without_truth = 0;  // left out
+};
+
+MatchedPoses MatchPoses(const Trajectory& truth, const Trajectory& priors,
+                        const Trajectory& refined) {
+  MatchedPoses matched;
+  for (const StampedPose& prior : priors) {
+    const auto true_pose = PoseAt(truth, prior.timestamp_ns);
+    if (!true_pose) {
+      ++matched.num_without_truth;
+      continue;
+    }
+    const StampedPose* pose = NearestPose(refined, prior.timestamp_ns, kSameFrameNs);
+    if (pose == nullptr) ++matched.num_missing;
+    matched.frames.push_back({*true_pose, prior.cam_from_world,
+                              pose != nullptr ? pose->cam_from_world : prior.cam_from_world});
+  }
+  return matched;
+}
+
+/// Counts the statuses in RUN/frames.jsonl.
+Outcome CountStatuses(const std::string& path, std::map<std::string, size_t>* out_counts) {
+  const Result<std::string> text = ReadFile(path);
+  if (!text) return FailureFrom(text.error());
+  size_t begin = 0;
+  for (int number = 1; begin < (*text).size(); ++number) {
+    const size_t end = std::min((*text).find('\n', begin), (*text).size());
+    const Json frame =
+        Json::parse((*text).begin() + static_cast<std::ptrdiff_t>(begin),
+                    (*text).begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+    begin = end + 1;
+    if (!frame.is_object() || !frame.contains("status") || !frame["status"].is_string()) {
+      return Failure{kExitBadData,
+                     path + ":" + std::to_string(number) + ": is no JSON object with a \"status\""};
+    }
+    ++(*out_counts)[frame["status"].get<std::string>()];
+  }
+  return std::nullopt;
+}
+
+Json Describe(const ErrorSummary& summary) {
+  return Json{{"median_cm", Rounded(summary.median_cm, 6)},
+              {"median_deg", Rounded(summary.median_deg, 6)},
+              {"p90_cm", Rounded(summary.p90_cm, 6)},
+              {"p90_deg", Rounded(summary.p90_deg, 6)},
+              {"recall_2cm_2deg", Rounded(summary.recall_2cm_2deg, 6)},
+              {"recall_5cm_5deg", Rounded(summary.recall_5cm_5deg, 6)}};
+}
+
+std::string ToText(const TrajectoryEvaluation& e) {
+  char text[400];
+  std::snprintf(text, sizeof(text),
+                "%zu frames\nprior    median %.2f cm  %.3f deg\n"
+                "refined  median %.2f cm  %.3f deg  p90 %.2f cm  %.2f deg\n"
+                "below 2 cm and 2 deg %.1f %%, below 5 cm and 5 deg %.1f %%\n"
+                "improved %.1f %%, harmed %.1f %%\n",
+                e.num_frames, e.prior.median_cm, e.prior.median_deg, e.refined.median_cm,
+                e.refined.median_deg, e.refined.p90_cm, e.refined.p90_deg,
+                100.0 * e.refined.recall_2cm_2deg, 100.0 * e.refined.recall_5cm_5deg,
+                100.0 * e.improved, 100.0 * e.harmed);
+  return text;
+}
+
+Outcome RunEvalTrajectory(const EvalTrajectoryOptions& options) {
+  const Result<Trajectory> truth = ReadTumTrajectory(options.truth);
+  if (!truth) return FailureFrom(truth.error());
+  const Result<Trajectory> priors = ReadTumTrajectory(options.priors);
+  if (!priors) return FailureFrom(priors.error());
+  const Result<Trajectory> refined = ReadTumTrajectory(options.run + "/trajectory.txt");
+  if (!refined) return FailureFrom(refined.error());
+  std::map<std::string, size_t> statuses;
+  if (Outcome failed = CountStatuses(options.run + "/frames.jsonl", &statuses)) return failed;
+
+  const MatchedPoses matched = MatchPoses(*truth, *priors, *refined);
+  if (matched.frames.empty()) {
+    return Failure{kExitBadData, options.truth + ": holds no pose at the time of any of the " +
+                                     std::to_string((*priors).size()) + " priors of " +
+                                     options.priors};
+  }
+  const TrajectoryEvaluation evaluation = EvaluateTrajectory(matched.frames);
+  if (!options.json) return PrintText(ToText(evaluation));
+  Json report = NewReport("eval_trajectory");
+  report["frames"] = evaluation.num_frames;
+  report["missing"] = matched.num_missing;
+  report["without_truth"] = matched.num_without_truth;
+  report["prior"] = Describe(evaluation.prior);
+  report["refined"] = Describe(evaluation.refined);
+  report["improved"] = Rounded(evaluation.improved, 6);
+  report["harmed"] = Rounded(evaluation.harmed, 6);
+  report["status"] = statuses;
+  return PrintJson(report);
+}
+
+}  // namespace
+
+void AddEvalTrajectory(CLI::App& eval, PendingRun& pending) {
+  AddCommand<EvalTrajectoryOptions>(
+      eval, pending, "trajectory", "Score refined poses against the truth and the priors",
+      [](CLI::App& command, EvalTrajectoryOptions& options) {
+        command.add_option("--run", options.run, "Directory that `plumbline replay` wrote")
+            ->required();
+        command.add_option("--truth", options.truth, "True poses, TUM format")->required();
+        command
+            .add_option("--priors", options.priors, "Prior poses, TUM format; these are the frames")
+            ->required();
+        command.add_flag(
+            "--json", options.json,
+            "Print {frames, prior, refined, improved, harmed, status}; recalls, improved "
+            "and harmed are shares of the frames, 0..1");
+        command.footer(
+            "No alignment. A frame without a refined pose counts as its prior. Harmed: worse than "
+            "the\n"
+            "prior by more than 0.5 cm or 0.1 deg.\n"
+            "Example:\n"
+            "  plumbline eval trajectory --run run --truth groundtruth.txt --priors priors.txt "
+            "--json");
+      },
+      RunEvalTrajectory);
+}
+
+}  // namespace plumb::tools

@@ -1,0 +1,62 @@
+// The command line program: parses, runs one sub-command, turns its outcome into an exit code.
+#include "tools/plumbline/program.h"
+
+#include <exception>
+
+#include "tools/plumbline/commands.h"
+#include "tools/plumbline/console.h"
+#include "tools/plumbline/json_report.h"
+
+namespace plumb::tools {
+namespace {
+
+constexpr const char* kFooter =
+    "Exit codes: 0 ok, 64 usage, 65 bad data, 66 input missing, 69 no usable device,\n"
+    "70 internal error, 73 output cannot be created, 74 I/O error, 75 device lost.\n"
+    "Data goes to stdout (with --json one JSON document alone), remarks to stderr.";
+
+/// A command that only groups others.
+CLI::App& AddGroup(CLI::App& parent, const char* name, const char* description) {
+  CLI::App* const group = parent.add_subcommand(name, description);
+  group->require_subcommand(1);
+  return *group;
+}
+
+void AddCommands(CLI::App& program, PendingRun& pending) {
+  AddDetect(program, pending);
+  CLI::App& eval = AddGroup(program, "eval", "Score detections or refined poses");
+  AddEvalLines(eval, pending);
+  AddEvalTrajectory(eval, pending);
+  AddVersion(program, pending);
+}
+
+int Fail(const Failure& failure) {
+  PrintRemark(failure.message);
+  return failure.code;
+}
+
+}  // namespace
+
+int RunProgram(int argc, const char* const* argv) {
+  PendingRun pending;
+  CLI::App program("Refines camera poses with 3D line maps.", "plumbline");
+  program.require_subcommand(1);
+  program.footer(kFooter);
+  program.set_version_flag("--version", PLUMB_VERSION);
+  try {
+    AddCommands(program, pending);
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    // --help and --version arrive as "errors" with code 0.
+    if (e.get_exit_code() == 0) return program.exit(e) == 0 ? kExitOk : kExitUsage;
+    return Fail({kExitUsage, std::string(e.what()) + " (try --help)"});
+  }
+  try {
+    const Outcome failed = pending();
+    return failed ? Fail(*failed) : static_cast<int>(kExitOk);
+  } catch (const std::exception& e) {
+    return Fail({kExitInternal, std::string("internal error: ") + e.what()});
+  }
+}
+
+}  // namespace plumb::tools

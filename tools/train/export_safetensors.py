@@ -27,7 +27,7 @@ def main(argv=None):
     parser.add_argument("--random", action="store_true", help="untrained weights of a preset, for speed measurements")
     parser.add_argument("--fp32", action="store_true", help="float32 tensors in place of float16")
     parser.add_argument("--size", type=int, help="input edge in pixels; default: the preset's")
-    parser.add_argument("--score-threshold", type=float, default=0.05)
+    parser.add_argument("--score-threshold", type=float, default=0.1)
     parser.add_argument("--top-k", type=int, default=evaluate.TOP_K)
     parser.add_argument("--nms-decay", type=float, default=evaluate.NMS_DECAY)
     parser.add_argument("--description", default="")

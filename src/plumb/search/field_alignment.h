@@ -1,0 +1,36 @@
+// Coarse alignment of a pose: Gauss-Newton on the direction field.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "plumb/geometry/camera.h"
+#include "plumb/search/direction_field.h"
+#include "plumb/search/field_lookup.h"
+#include "plumb/search/line_samples.h"
+
+namespace plumb {
+
+struct FieldAlignmentOptions {
+  double sigma_px = 12.0;  // of the robust weight
+  int num_steps = 3;
+  /// Prior factor around the identity, per component of the tangent vector.
+  double prior_rotation_sigma_rad = 0.05, prior_position_sigma_m = 0.15;
+};
+
+/// The residual of a sample is the field's distance, its gradient the central difference of its
+/// channel; weights w n / (1 + (r / sigma)^2)^2 / sigma^2, truncated samples left out.
+/// Source: docs/method/association.md. Owns its work space; not thread-safe.
+class FieldAligner {
+ public:
+  /// @return the pose after `num_steps`; earlier if a step cannot be solved.
+  RelativePose Align(const Camera& camera, const DirectionField& field, const LineSamples& samples,
+                     const RelativePose& start, const FieldAlignmentOptions& options);
+
+ private:
+  FieldLookups lookups_;
+  std::vector<float> distance_, gradient_x_, gradient_y_, weighted_;
+  std::array<std::vector<float>, 6> jacobian_;
+};
+
+}  // namespace plumb

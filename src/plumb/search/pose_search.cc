@@ -1,0 +1,167 @@
+#include "plumb/search/pose_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace plumb {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+// Pixel constants below hold for images of about this size.
+constexpr int kMaxSearchWidthPx = 960, kReducedWidthPx = 640;
+
+constexpr DirectionFieldOptions kScoringField{.cell_px = 4, .tolerance_rad = 15.0 * kDegree};
+constexpr DirectionFieldOptions kAlignmentField{.cell_px = 2, .tolerance_rad = 10.0 * kDegree};
+constexpr double kScoringSigmaPx = 20.0;
+
+struct Level {
+  double sigma_px;
+  int num_steps;
+};
+constexpr Level kLevels[] = {{30.0, 3}, {20.0, 3}, {12.0, 3}, {6.0, 3}, {3.0, 2}};
+constexpr size_t kMinAligned = 8;  // never fewer at a level
+constexpr double kFinalSigmaPx = 3.0;
+constexpr double kPriorScale = 1.5;  // of the alignment's prior factor over the prior's own sigma
+
+constexpr size_t kMaxClusters = 12;
+constexpr size_t kRotationSegments = 100;  // the longest; more do not change the ranking
+constexpr float kRotationJitter = static_cast<float>(0.5 * kDegree);
+
+constexpr double kDistinctPositionM = 0.02, kDistinctRotationRad = 0.01;
+
+Camera Reduce(const Camera& camera, double scale) {
+  // Pixel centres: x' + 1/2 = s (x + 1/2).
+  Camera out = camera;
+  out.fx *= scale;
+  out.fy *= scale;
+  out.cx = scale * (camera.cx + 0.5) - 0.5;
+  out.cy = scale * (camera.cy + 0.5) - 0.5;
+  out.width_px = std::max(1, static_cast<int>(std::lround(camera.width_px * scale)));
+  out.height_px = std::max(1, static_cast<int>(std::lround(camera.height_px * scale)));
+  return out;
+}
+
+}  // namespace
+
+std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const SearchRegion& region,
+                                              std::span<const SearchLine> lines,
+                                              std::span<const Segment2> segments,
+                                              const PoseSearchOptions& options, uint64_t seed) {
+  found_.clear();
+  const double scale = camera.width_px > kMaxSearchWidthPx
+                           ? static_cast<double>(kReducedWidthPx) / camera.width_px
+                           : 1.0;
+  camera_ = scale < 1.0 ? Reduce(camera, scale) : camera;
+  segments_.clear();
+  for (const Segment2& segment : segments) {
+    if (!(segment.Length() > 0.0)) continue;
+    const auto reduce = [&](const Eigen::Vector2d& p) -> Eigen::Vector2d {
+      return (scale * (p.array() + 0.5) - 0.5).matrix();
+    };
+    segments_.push_back(scale < 1.0
+                            ? Segment2{reduce(segment.start), reduce(segment.end), segment.score}
+                            : segment);
+  }
+  SampleLines(camera_, region.cam_from_world, lines, &samples_);
+  if (samples_.count == 0 || segments_.empty()) return found_;
+
+  DrawHypotheses(region, lines, options, seed);
+  coarse_field_.Assign(camera_.width_px, camera_.height_px, segments_, kScoringField);
+  Rank(kScoringSigmaPx, coarse_field_);
+  // The prior itself always takes part.
+  const size_t kept = std::min(options.num_aligned, hypotheses_.size());
+  const auto prior = std::find_if(hypotheses_.begin(), hypotheses_.end(),
+                                  [](const Hypothesis& h) { return h.rank == 0; });
+  if (prior - hypotheses_.begin() >= static_cast<ptrdiff_t>(kept)) {
+    const Hypothesis keep = *prior;
+    hypotheses_.resize(kept);
+    hypotheses_.push_back(keep);
+  } else {
+    hypotheses_.resize(kept);
+  }
+  fine_field_.Assign(camera_.width_px, camera_.height_px, segments_, kAlignmentField);
+  Align(region);
+  CollectSurvivors(region, options.num_survivors);
+  return found_;
+}
+
+void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const SearchLine> lines,
+                                const PoseSearchOptions& options, uint64_t seed) {
+  Random random(seed);
+  const float rotation_sigma = static_cast<float>(region.rotation_sigma_rad / std::sqrt(3.0));
+  const float position_sigma = static_cast<float>(region.position_sigma_m / std::sqrt(3.0));
+  hypotheses_.clear();
+  // A camera centre moved by c (in the prior's camera frame) is the translation -R c.
+  const auto add = [&](const Eigen::Matrix3f& rotation, const Eigen::Vector3f& shift) {
+    Hypothesis& h = hypotheses_.emplace_back();
+    h.pose = {rotation, -(rotation * shift)};
+    h.rank = static_cast<uint32_t>(hypotheses_.size() - 1);
+  };
+  add(Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero());
+  const uint32_t num_drawn = (options.num_hypotheses + 1) / 2;
+  for (uint32_t k = 1; k < num_drawn; ++k) {
+    const Eigen::Matrix3f rotation = RotationFromVector(random.Normal3(rotation_sigma));
+    add(rotation, random.Normal3(position_sigma));
+  }
+  if (options.num_hypotheses <= num_drawn) return;
+
+  lines_in_prior_.clear();
+  for (const SearchLine& line : lines) {
+    lines_in_prior_.push_back({{region.cam_from_world * line.segment_in_world.start,
+                                region.cam_from_world * line.segment_in_world.end},
+                               line.weight});
+  }
+  clusterer_.Cluster(lines_in_prior_, kMaxClusters, &clusters_);
+  rotation_search_.Search(
+      camera_, std::span(segments_).first(std::min(segments_.size(), kRotationSegments)), clusters_,
+      {.num_draws = options.num_hypotheses, .rotation_sigma_rad = region.rotation_sigma_rad},
+      &random, &rotations_);
+  for (uint32_t k = num_drawn; k < options.num_hypotheses; ++k) {
+    const Eigen::Matrix3f& found =
+        rotations_[random.Below(static_cast<uint32_t>(rotations_.size()))];
+    const Eigen::Matrix3f rotation = RotationFromVector(random.Normal3(kRotationJitter)) * found;
+    add(rotation, random.Normal3(position_sigma));
+  }
+}
+
+void PoseSearch::Rank(double sigma_px, const DirectionField& field) {
+  scorer_.Prepare(camera_, field, sigma_px);
+  for (Hypothesis& h : hypotheses_) h.score = scorer_.Score(h.pose, samples_);
+  std::sort(hypotheses_.begin(), hypotheses_.end(), [](const Hypothesis& a, const Hypothesis& b) {
+    return a.score != b.score ? a.score > b.score : a.rank < b.rank;
+  });
+}
+
+void PoseSearch::Align(const SearchRegion& region) {
+  for (const Level& level : kLevels) {
+    const FieldAlignmentOptions options{
+        .sigma_px = level.sigma_px,
+        .num_steps = level.num_steps,
+        .prior_rotation_sigma_rad = kPriorScale * region.rotation_sigma_rad,
+        .prior_position_sigma_m = kPriorScale * region.position_sigma_m};
+    for (Hypothesis& h : hypotheses_) {
+      h.pose = aligner_.Align(camera_, fine_field_, samples_, h.pose, options);
+    }
+    if (hypotheses_.size() <= kMinAligned) continue;
+    Rank(level.sigma_px, fine_field_);
+    hypotheses_.resize(std::max(kMinAligned, hypotheses_.size() / 2));
+  }
+}
+
+void PoseSearch::CollectSurvivors(const SearchRegion& region, size_t max_survivors) {
+  Rank(kFinalSigmaPx, fine_field_);
+  for (const Hypothesis& h : hypotheses_) {
+    if (found_.size() == max_survivors) return;
+    const Rigid3 pose = h.pose.After(region.cam_from_world);
+    const bool is_distinct = std::all_of(found_.begin(), found_.end(), [&](const FoundPose& other) {
+      const PoseDistance distance = DistanceBetween(pose, other.cam_from_world);
+      return distance.position_m > kDistinctPositionM ||
+             distance.rotation_rad > kDistinctRotationRad;
+    });
+    if (is_distinct) found_.push_back({pose, h.score});
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,82 @@
+// From an uncertain prior pose to a few poses that are near enough for matching.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rigid3.h"
+#include "plumb/geometry/segment.h"
+#include "plumb/search/direction_clusters.h"
+#include "plumb/search/direction_field.h"
+#include "plumb/search/field_alignment.h"
+#include "plumb/search/field_score.h"
+#include "plumb/search/line_samples.h"
+#include "plumb/search/random.h"
+#include "plumb/search/rotation_search.h"
+#include "plumb/search/search_line.h"
+
+namespace plumb {
+
+/// Where to search: camera centre and rotation are independent; norms, one standard deviation.
+struct SearchRegion {
+  Rigid3 cam_from_world;
+  double rotation_sigma_rad = 0.035;
+  double position_sigma_m = 0.10;
+};
+
+struct PoseSearchOptions {
+  uint32_t num_hypotheses = 1500;
+  size_t num_aligned = 64;   // best hypotheses that are aligned, beside the prior itself
+  size_t num_survivors = 4;  // distinct poses returned at most
+};
+
+struct FoundPose {
+  Rigid3 cam_from_world;
+  double score = 0.0;  // FieldScorer's at 3 px
+};
+
+/// Hypotheses from the prior (half of them with the rotation found first), scored on a direction
+/// field of quarter resolution; the best are aligned on one of half resolution while sigma shrinks
+/// from 30 to 3 px and the worse half is dropped at each level. Images wider than 960 px are
+/// searched as if 640 px wide. Equal inputs and seeds give equal results. Owns its work space, does
+/// not allocate once warm; not thread-safe. Source: docs/method/association.md.
+class PoseSearch {
+ public:
+  /// @return up to num_survivors poses, best first, any two more than 2 cm or 0.01 rad apart; valid
+  ///         until the next call. Empty without lines or segments.
+  std::span<const FoundPose> Search(const Camera& camera, const SearchRegion& region,
+                                    std::span<const SearchLine> lines,
+                                    std::span<const Segment2> segments,
+                                    const PoseSearchOptions& options, uint64_t seed);
+
+ private:
+  struct Hypothesis {
+    RelativePose pose;  // cam_from_prior
+    float score = 0.0f;
+    uint32_t rank = 0;  // order of drawing, breaks ties
+  };
+
+  void DrawHypotheses(const SearchRegion& region, std::span<const SearchLine> lines,
+                      const PoseSearchOptions& options, uint64_t seed);
+  void Rank(double sigma_px, const DirectionField& field);
+  void Align(const SearchRegion& region);
+  void CollectSurvivors(const SearchRegion& region, size_t max_survivors);
+
+  Camera camera_;                   // of the searched image
+  std::vector<Segment2> segments_;  // in the searched image
+  LineSamples samples_;
+  DirectionField coarse_field_, fine_field_;
+  DirectionClusterer clusterer_;
+  std::vector<SearchLine> lines_in_prior_;
+  std::vector<DirectionCluster> clusters_;
+  RotationSearch rotation_search_;
+  std::vector<Eigen::Matrix3f> rotations_;
+  FieldScorer scorer_;
+  FieldAligner aligner_;
+  std::vector<Hypothesis> hypotheses_;
+  std::vector<FoundPose> found_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,30 @@
+// The search's own random numbers: equal seeds give equal draws on every standard library.
+#pragma once
+
+#include <cstdint>
+
+#include <Eigen/Core>
+
+namespace plumb {
+
+/// SplitMix64 (Steele, Lea, Flood 2014). Not for secrets.
+class Random {
+ public:
+  explicit Random(uint64_t seed) : state_(seed) {}
+
+  uint64_t Next();
+  /// Uniform in [0, 1), 24 bits.
+  float Uniform();
+  /// Uniform in 0..count - 1, count > 0.
+  uint32_t Below(uint32_t count);
+  /// Three independent normal numbers with the standard deviation `sigma` each (Box-Muller).
+  Eigen::Vector3f Normal3(float sigma);
+
+ private:
+  uint64_t state_;
+};
+
+/// One seed out of two, such that neighbouring pairs give unrelated draws.
+uint64_t MixSeeds(uint64_t a, uint64_t b);
+
+}  // namespace plumb

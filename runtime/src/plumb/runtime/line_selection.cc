@@ -1,0 +1,146 @@
+#include "plumb/runtime/line_selection.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plumb/geometry/line_projection.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kLengthCapPx = 150.0;
+constexpr double kMinLengthPx = 15.0;
+
+constexpr size_t kMaxSearchLines = 300, kMaxAlignmentLines = 250, kMaxLocalLines = 400;
+constexpr uint32_t kAlignmentKeyFrames = 5, kLocalKeyFrames = 3;
+constexpr size_t kFewLines = 30;
+
+// Margins around the image: lists for a fixed pose need less than those for an uncertain one.
+constexpr double kSearchMarginPx = 100.0, kSearchMarginPxPerRad = 400.0;
+constexpr double kRankMarginPx = 30.0;
+const VisibilityOptions kVisibility;
+
+// Deviations of a lifted end point: along its ray from depth, across it from the segment's pixels.
+constexpr double kDepthQuadratic = 0.004, kDepthConstantM = 0.003, kPixelSigma = 0.7;
+
+Eigen::Matrix3d LiftedCovariance(const KeyFrame& key_frame, const Eigen::Vector3d& x_in_world) {
+  const Eigen::Vector3d x = key_frame.cam_from_world * x_in_world;
+  const double across = kPixelSigma * x.z() / key_frame.camera.MeanFocal();
+  const double along = kDepthQuadratic * x.z() * x.z() + kDepthConstantM;
+  const Eigen::Vector3d ray = key_frame.cam_from_world.rotation.conjugate() * x.normalized();
+  return across * across * Eigen::Matrix3d::Identity() +
+         (along * along - across * across) * ray * ray.transpose();
+}
+
+// Seen from about the same side and distance as in the key frame that lifted it.
+bool IsSeenAlike(const Eigen::Vector3d& midpoint, const Eigen::Vector3d& key_frame_center,
+                 const Eigen::Vector3d& center) {
+  const Eigen::Vector3d a = key_frame_center - midpoint, b = center - midpoint;
+  const double distance_a = a.norm(), distance_b = b.norm();
+  static const double kMinCosine = std::cos(kVisibility.max_view_angle_rad);
+  return a.dot(b) > kMinCosine * distance_a * distance_b &&
+         distance_a < kVisibility.max_distance_ratio * distance_b &&
+         distance_b < kVisibility.max_distance_ratio * distance_a;
+}
+
+}  // namespace
+
+double LineWeight(const MapLine& line) {
+  const double observing = line.num_observing;
+  const double stability = observing / std::max<double>({line.num_expected * 1.0, observing, 1.0});
+  return (0.3 + 0.7 * std::min(1.0, 1.5 * stability)) * std::min(1.0, observing / 3.0);
+}
+
+void LineSelector::KeepBest(size_t max_lines) {
+  const size_t kept = std::min(max_lines, ranked_.size());
+  std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<ptrdiff_t>(kept), ranked_.end(),
+                    [](const Ranked& a, const Ranked& b) {
+                      return a.value != b.value ? a.value > b.value : a.id < b.id;
+                    });
+  ranked_.resize(kept);
+}
+
+void LineSelector::AppendFused(const Camera& camera, const Rigid3& cam_from_world,
+                               std::span<const uint32_t> lines, double margin_px, size_t max_lines,
+                               std::vector<CandidateLine>* out) {
+  const LineMap& map = index_.map();
+  ranked_.clear();
+  for (const uint32_t id : lines) {
+    const auto image =
+        ProjectSegment(camera, cam_from_world, map.lines[id].segment_in_world, margin_px);
+    const double length = image ? image->Length() : 0.0;
+    ranked_.push_back({std::min(length, kLengthCapPx) * LineWeight(map.lines[id]), id});
+  }
+  KeepBest(max_lines);
+  out->clear();
+  for (const Ranked& entry : ranked_) {
+    const MapLine& line = map.lines[entry.id];
+    out->push_back({.segment_in_world = line.segment_in_world,
+                    .weight = LineWeight(line),
+                    .covariance_start = line.covariance_start,
+                    .covariance_end = line.covariance_end,
+                    .id = entry.id});
+  }
+}
+
+void LineSelector::SelectForSearch(const Camera& camera, const Rigid3& cam_from_world,
+                                   double rotation_sigma_rad, std::vector<CandidateLine>* out) {
+  VisibilityOptions options = kVisibility;
+  options.margin_px = kSearchMarginPx + kSearchMarginPxPerRad * rotation_sigma_rad;
+  options.min_length_px = kMinLengthPx;
+  index_.VisibleLines(camera, cam_from_world, options, &visible_);
+  AppendFused(camera, cam_from_world, visible_, options.margin_px, kMaxSearchLines, out);
+}
+
+void LineSelector::SelectForAlignment(const Camera& camera, const Rigid3& cam_from_world,
+                                      std::vector<CandidateLine>* out) {
+  VisibilityOptions options = kVisibility;
+  options.min_length_px = kMinLengthPx;
+  options.nearest_key_frames = kAlignmentKeyFrames;
+  index_.VisibleLines(camera, cam_from_world, options, &visible_);
+  if (visible_.size() < kFewLines) {
+    options.nearest_key_frames = 0;
+    index_.VisibleLines(camera, cam_from_world, options, &visible_);
+  }
+  AppendFused(camera, cam_from_world, visible_, kRankMarginPx, kMaxAlignmentLines, out);
+}
+
+void LineSelector::SelectLocal(const Camera& camera, const Rigid3& cam_from_world,
+                               std::vector<CandidateLine>* out) {
+  const LineMap& map = index_.map();
+  index_.NearestKeyFrames(cam_from_world, kLocalKeyFrames, &key_frames_);
+  const Eigen::Vector3d center = cam_from_world.Center();
+  ranked_.clear();
+  uint32_t id = 0;
+  for (const uint32_t k : key_frames_) {
+    const KeyFrame& key_frame = map.key_frames[k];
+    const Eigen::Vector3d key_frame_center = key_frame.cam_from_world.Center();
+    for (const LiftedSegment& lifted : key_frame.segments) {
+      const uint32_t this_id = id++;
+      const Segment3& segment = lifted.segment_in_world;
+      if (!IsSeenAlike(segment.Midpoint(), key_frame_center, center)) continue;
+      const auto image = ProjectSegment(camera, cam_from_world, segment, kRankMarginPx);
+      const double length = image ? image->Length() : 0.0;
+      if (!(length > kMinLengthPx)) continue;
+      ranked_.push_back({std::min(length, kLengthCapPx), this_id});
+    }
+  }
+  KeepBest(kMaxLocalLines);
+  out->clear();
+  for (const Ranked& entry : ranked_) {
+    uint32_t offset = entry.id;
+    size_t k = 0;
+    while (offset >= map.key_frames[key_frames_[k]].segments.size()) {
+      offset -= static_cast<uint32_t>(map.key_frames[key_frames_[k++]].segments.size());
+    }
+    const KeyFrame& key_frame = map.key_frames[key_frames_[k]];
+    const Segment3& segment = key_frame.segments[offset].segment_in_world;
+    out->push_back({.segment_in_world = segment,
+                    .weight = 1.0,
+                    .covariance_start = LiftedCovariance(key_frame, segment.start),
+                    .covariance_end = LiftedCovariance(key_frame, segment.end),
+                    .id = entry.id});
+  }
+}
+
+}  // namespace plumb

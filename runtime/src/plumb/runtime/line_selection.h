@@ -1,0 +1,56 @@
+// Which map lines a frame is matched with: bounded lists, the most useful lines first.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rigid3.h"
+#include "plumb/map/map_index.h"
+#include "plumb/matching/candidate_line.h"
+
+namespace plumb {
+
+/// Stability of a map line, (0.3 + 0.7 min(1, 1.5 s)) min(1, n / 3), for n key frames that observed
+/// it out of n / s that should have.
+double LineWeight(const MapLine& line);
+
+/// Selects lines visible from a pose. A list keeps the lines with the largest weight times visible
+/// length (at most 150 px), best first, ties by id. Owns its work space and does not allocate once
+/// warm; not thread-safe. Source: docs/method/association.md.
+class LineSelector {
+ public:
+  /// `index` is borrowed.
+  explicit LineSelector(const MapIndex& index) : index_(index) {}
+
+  /// At most 300 fused lines that a camera within the prior's uncertainty may see. `id` is the
+  /// map line.
+  void SelectForSearch(const Camera& camera, const Rigid3& cam_from_world,
+                       double rotation_sigma_rad, std::vector<CandidateLine>* out);
+
+  /// At most 250 fused lines for the fine alignment: seen by one of the 5 nearest key frames, or by
+  /// any when those are fewer than 30. `id` is the map line.
+  void SelectForAlignment(const Camera& camera, const Rigid3& cam_from_world,
+                          std::vector<CandidateLine>* out);
+
+  /// At most 400 unfused lines of the 3 nearest key frames, with the covariance of their own depth
+  /// and weight 1. `id` counts the segments of those key frames.
+  void SelectLocal(const Camera& camera, const Rigid3& cam_from_world,
+                   std::vector<CandidateLine>* out);
+
+ private:
+  struct Ranked {
+    double value;
+    uint32_t id;
+  };
+  void AppendFused(const Camera& camera, const Rigid3& cam_from_world,
+                   std::span<const uint32_t> lines, double margin_px, size_t max_lines,
+                   std::vector<CandidateLine>* out);
+  void KeepBest(size_t max_lines);
+
+  const MapIndex& index_;
+  std::vector<uint32_t> visible_, key_frames_;
+  std::vector<Ranked> ranked_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,140 @@
+#include "plumb/runtime/paper_method.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "plumb/geometry/line_projection.h"
+#include "plumb/refine/uncertainty.h"
+#include "plumb/runtime/acceptance_gate.h"
+
+namespace plumb {
+namespace {
+
+constexpr uint32_t kNumKeyFrames = 5;
+constexpr double kMinOverlap = 0.25;
+constexpr int kMaxRematches = 3;
+constexpr size_t kMinMatches = 4;
+constexpr double kMinVisiblePx = 10.0;
+constexpr double kMinGain = 1.03;
+constexpr double kVariancePx2 = 0.7 * 0.7;
+constexpr double kRobust = 2.0;
+constexpr size_t kMaxSegments = 400;
+
+int64_t NowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+PaperMethod::PaperMethod(const MapIndex& index, const PoseRefinerOptions& options)
+    : index_(index), options_(options), selector_(index) {
+  const LineMap& map = index.map();
+  for (const MapLine& line : map.lines) lines_.push_back(line.segment_in_world);
+  for (const KeyFrame& key_frame : map.key_frames) {
+    View& view = views_.emplace_back();
+    for (const LiftedSegment& lifted : key_frame.segments) {
+      if (!lifted.line) continue;
+      view.segments.push_back(lifted.segment_px);
+      view.lines.push_back(*lifted.line);
+    }
+  }
+}
+
+void PaperMethod::CollectCandidates(const RefineInput& input) {
+  const LineMap& map = index_.map();
+  candidates_.clear();
+  index_.NearestKeyFrames(input.prior.cam_from_world, kNumKeyFrames, &key_frames_);
+  for (const uint32_t k : key_frames_) {
+    AppendEpipolarCandidates(input.camera, input.prior.cam_from_world, segments_.segments,
+                             {.camera = map.key_frames[k].camera,
+                              .cam_from_world = map.key_frames[k].cam_from_world,
+                              .segments = views_[k].segments,
+                              .lines = views_[k].lines},
+                             kMinOverlap, &candidates_);
+  }
+  std::sort(candidates_.begin(), candidates_.end());
+  candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
+}
+
+void PaperMethod::Solve(const RefineInput& input, Rigid3* cam_from_world) {
+  points_.clear();
+  for (const PointMatch& match : input.points) {
+    points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
+  }
+  assignments_.clear();
+  for (int rematch = 0; rematch < kMaxRematches; ++rematch) {
+    AssignOneToOne(input.camera, *cam_from_world, segments_.segments, lines_, candidates_,
+                   ReprojectionGates{}, &assignments_);
+    if (assignments_.size() < kMinMatches) return;
+    paper_lines_.clear();
+    for (const LineAssignment& match : assignments_) {
+      paper_lines_.push_back(
+          {lines_[match.line], segments_.segments[match.segment], match.projected_length_px});
+    }
+    const auto solution =
+        SolvePaperCost(input.camera, *cam_from_world, paper_lines_, points_, JointSolverOptions{});
+    if (!solution) return;
+    *cam_from_world = solution->cam_from_world;
+  }
+}
+
+PoseSupport PaperMethod::MeasureSupport(const Camera& camera, const Rigid3& cam_from_world) {
+  ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
+  return support_meter_.Measure(projected_, segments_.table);
+}
+
+void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
+  const int64_t start_ns = NowNs();
+  const Rigid3& prior = input.prior.cam_from_world;
+  segments_.Assign(input.segments, kMaxSegments);
+  selector_.SelectForSearch(input.camera, prior, input.prior.rotation_sigma_rad, &search_lines_);
+  CollectCandidates(input);
+  Rigid3 refined = prior;
+  Solve(input, &refined);
+
+  observations_.clear();
+  for (const LineAssignment& match : assignments_) {
+    observations_.push_back({.line_in_world = lines_[match.line],
+                             .part_px = segments_.segments[match.segment],
+                             .weight = 1.0,
+                             .variance_px2 = kVariancePx2});
+  }
+  const LineEquations terms = AccumulateLines(input.camera, refined, observations_, kRobust);
+  const Matrix6d prior_information =
+      PriorCovariance(input.prior.rotation_sigma_rad, input.prior.position_sigma_m).inverse();
+  const double factor = index_.map().covariance_factor;
+  const GateEvidence evidence{
+      .refined = MeasureSupport(input.camera, refined),
+      .prior = MeasureSupport(input.camera, prior),
+      .num_pairs = observations_.size(),
+      .num_observed_directions =
+          Observe(terms.equations.information / (std::max(terms.residual_scale, 1.0) * factor),
+                  prior_information)
+              .num_observed};
+  result->status =
+      Decide(evidence, {.min_map_support = options_.min_map_support, .min_gain = kMinGain});
+  result->map_support = evidence.refined.map_share;
+  result->num_observed_directions = evidence.num_observed_directions;
+  if (result->status == RefineStatus::kRefined) {
+    result->cam_from_world = refined;
+    result->covariance = PoseCovariance(terms.equations.information, terms.residual_scale, factor,
+                                        prior_information);
+    result->num_points_used = static_cast<uint32_t>(points_.size());
+  }
+  for (const LineAssignment& match : assignments_) {
+    const Segment2& segment = segments_.segments[match.segment];
+    const Segment3& line = lines_[match.line];
+    const auto image = ProjectLine(
+        input.camera, {result->cam_from_world * line.start, result->cam_from_world * line.end});
+    if (!image) continue;
+    const double a = image->SignedDistance(segment.start), b = image->SignedDistance(segment.end);
+    result->matches.push_back({.segment = segments_.source[match.segment],
+                               .line = match.line,
+                               .distance_px = std::sqrt(0.5 * (a * a + b * b))});
+  }
+  result->match_and_refine_ns = NowNs() - start_ns;
+}
+
+}  // namespace plumb

@@ -1,0 +1,85 @@
+#include "plumb/runtime/pose_refiner.h"
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "plumb/refine/uncertainty.h"
+#include "plumb/runtime/paper_method.h"
+#include "plumb/runtime/refine_input_check.h"
+#include "plumb/runtime/search_method.h"
+
+namespace plumb {
+
+std::string_view ToString(RefineStatus status) {
+  switch (status) {
+    case RefineStatus::kRefined:
+      return "REFINED";
+    case RefineStatus::kKeptPrior:
+      return "KEPT_PRIOR";
+    case RefineStatus::kAmbiguous:
+      return "AMBIGUOUS";
+    case RefineStatus::kDegenerate:
+      return "DEGENERATE";
+    case RefineStatus::kLowSupport:
+      return "LOW_SUPPORT";
+  }
+  return "UNKNOWN";
+}
+
+Status PoseRefinerOptions::Validate() const {
+  if (num_hypotheses < 1 || num_hypotheses > 2048) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "num_hypotheses " + std::to_string(num_hypotheses) + " is not in 1..2048"};
+  }
+  if (!(min_map_support > 0.0 && min_map_support < 1.0)) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "min_map_support " + std::to_string(min_map_support) + " is not in (0, 1)"};
+  }
+  return Ok();
+}
+
+struct PoseRefiner::Impl {
+  std::optional<SearchMethod> search;
+  std::optional<PaperMethod> paper;
+};
+
+PoseRefiner::PoseRefiner(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+PoseRefiner::~PoseRefiner() = default;
+
+Result<std::unique_ptr<PoseRefiner>> PoseRefiner::Create(const MapIndex& index,
+                                                         const PoseRefinerOptions& options) {
+  if (Status status = options.Validate(); !status) return status.error();
+  auto impl = std::make_unique<Impl>();
+  if (options.method == RefineMethod::kPaper) {
+    impl->paper.emplace(index, options);
+  } else {
+    impl->search.emplace(index, options);
+  }
+  return std::unique_ptr<PoseRefiner>(new PoseRefiner(std::move(impl)));
+}
+
+Status PoseRefiner::Refine(const RefineInput& input, RefineResult* out_result) {
+  if (Status status = CheckRefineInput(input); !status) return status;
+  const auto start = std::chrono::steady_clock::now();
+  // Starts from the answer "the prior is kept"; the matches keep their capacity.
+  std::vector<LineMatch> matches = std::move(out_result->matches);
+  matches.clear();
+  *out_result = RefineResult{};
+  out_result->matches = std::move(matches);
+  out_result->cam_from_world = input.prior.cam_from_world;
+  out_result->covariance =
+      PriorCovariance(input.prior.rotation_sigma_rad, input.prior.position_sigma_m);
+  if (impl_->search) {
+    impl_->search->Refine(input, out_result);
+  } else {
+    impl_->paper->Refine(input, out_result);
+  }
+  out_result->total_ns =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - start)
+          .count();
+  return Ok();
+}
+
+}  // namespace plumb

@@ -1,0 +1,86 @@
+#include "plumb/runtime/refine_input_check.h"
+
+#include <cmath>
+#include <string>
+
+namespace plumb {
+namespace {
+
+// A prior this uncertain is no prior; a tighter one would divide by zero.
+constexpr double kMaxPositionSigmaM = 1e3, kMaxRotationSigmaRad = 3.2, kMinSigma = 1e-9;
+constexpr double kUnitTolerance = 1e-3;
+// Coordinates beyond this are not pixels of any image [px].
+constexpr double kMaxPixel = 1e6;
+
+Error Invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
+
+bool IsPixel(const Eigen::Vector2d& p) {
+  return std::abs(p.x()) < kMaxPixel && std::abs(p.y()) < kMaxPixel;  // False for NaN.
+}
+
+std::string Text(const Eigen::Vector2d& p) {
+  return "(" + std::to_string(p.x()) + ", " + std::to_string(p.y()) + ")";
+}
+std::string Text(const Eigen::Vector3d& p) {
+  return "(" + std::to_string(p.x()) + ", " + std::to_string(p.y()) + ", " + std::to_string(p.z()) +
+         ")";
+}
+
+Status CheckCamera(const Camera& camera) {
+  if (camera.IsValid()) return Ok();
+  return Invalid("camera has fx " + std::to_string(camera.fx) + ", fy " +
+                 std::to_string(camera.fy) + ", cx " + std::to_string(camera.cx) + ", cy " +
+                 std::to_string(camera.cy) + " and " + std::to_string(camera.width_px) + " x " +
+                 std::to_string(camera.height_px) +
+                 " pixels; focal lengths must be finite and not 0, the size positive");
+}
+
+Status CheckPrior(const PosePrior& prior) {
+  const Eigen::Quaterniond& q = prior.cam_from_world.rotation;
+  if (!q.coeffs().allFinite() || !(std::abs(q.norm() - 1.0) < kUnitTolerance)) {
+    return Invalid("prior rotation (x, y, z, w) = (" + std::to_string(q.x()) + ", " +
+                   std::to_string(q.y()) + ", " + std::to_string(q.z()) + ", " +
+                   std::to_string(q.w()) + ") is not a finite unit quaternion");
+  }
+  if (!prior.cam_from_world.translation.allFinite()) {
+    return Invalid("prior translation " + Text(prior.cam_from_world.translation) +
+                   " is not finite");
+  }
+  const auto in_range = [](double sigma, double max) { return sigma >= kMinSigma && sigma <= max; };
+  if (!in_range(prior.position_sigma_m, kMaxPositionSigmaM)) {
+    return Invalid("prior position uncertainty " + std::to_string(prior.position_sigma_m) +
+                   " m is not in (0, 1000]");
+  }
+  if (!in_range(prior.rotation_sigma_rad, kMaxRotationSigmaRad)) {
+    return Invalid("prior rotation uncertainty " + std::to_string(prior.rotation_sigma_rad) +
+                   " rad is not in (0, 3.2]");
+  }
+  return Ok();
+}
+
+}  // namespace
+
+Status CheckRefineInput(const RefineInput& input) {
+  if (Status status = CheckCamera(input.camera); !status) return status;
+  if (Status status = CheckPrior(input.prior); !status) return status;
+  for (size_t i = 0; i < input.segments.size(); ++i) {
+    const Segment2& segment = input.segments[i];
+    if (IsPixel(segment.start) && IsPixel(segment.end)) continue;
+    return Invalid("segment " + std::to_string(i) + " from " + Text(segment.start) + " to " +
+                   Text(segment.end) + " is not in pixels of an image");
+  }
+  for (size_t i = 0; i < input.points.size(); ++i) {
+    const PointMatch& point = input.points[i];
+    if (!IsPixel(point.pixel)) {
+      return Invalid("point " + std::to_string(i) + " at " + Text(point.pixel) +
+                     " is not in pixels of an image");
+    }
+    if (!point.point_in_world.allFinite() || !point.deviation_in_world.allFinite()) {
+      return Invalid("point " + std::to_string(i) + " in the world " + Text(point.point_in_world) +
+                     " with deviation " + Text(point.deviation_in_world) + " is not finite");
+    }
+  }
+  return Ok();
+}
+
+}  // namespace plumb

@@ -1,0 +1,221 @@
+#include "plumb/runtime/search_method.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "plumb/refine/joint_solver.h"
+#include "plumb/refine/uncertainty.h"
+
+namespace plumb {
+namespace {
+
+constexpr size_t kMaxSegments = 250;
+constexpr size_t kMinLines = 6, kMinSegments = 6;
+constexpr double kMinVisiblePx = 10.0;
+
+// The prior is a weak factor of the alignment: it decides only what the lines leave open.
+constexpr double kPriorFactorScale = 2.0;
+
+constexpr double kSearchGain = 1.03, kStreamGain = 1.0;
+
+// A second attempt looks twice as far. A prior that was found good needs none.
+constexpr double kWideningFactor = 2.0;
+constexpr uint32_t kMaxHypotheses = 2048;
+
+constexpr size_t kMinLocalLines = 20;
+
+// Points that take part in the joint solution lie this near to the lines' pose.
+constexpr double kPointGatePx = 10.0;
+constexpr size_t kMinPoints = 6;
+
+// Of the pairs that are reported as matches.
+constexpr AssociationGates kMatchGates{.sigma_px = 2.0, .sigma_sine = 0.05};
+
+int64_t NowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+PosePriorFactor WeakFactor(const PosePrior& prior) {
+  return {prior.cam_from_world, kPriorFactorScale * prior.rotation_sigma_rad,
+          kPriorFactorScale * prior.position_sigma_m};
+}
+
+Matrix6d PriorInformation(const PosePrior& prior) {
+  return PriorCovariance(prior.rotation_sigma_rad, prior.position_sigma_m)
+      .diagonal()
+      .cwiseInverse()
+      .asDiagonal();
+}
+
+}  // namespace
+
+SearchMethod::SearchMethod(const MapIndex& index, const PoseRefinerOptions& options)
+    : index_(index), options_(options), selector_(index) {}
+
+void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
+  const int64_t start_ns = NowNs();
+  segments_.Assign(input.segments, kMaxSegments);
+  Attempt attempt = Try(input, input.prior, options_.num_hypotheses);
+  PosePrior prior = input.prior;
+  const bool may_widen =
+      input.search &&
+      (attempt.status == RefineStatus::kLowSupport || attempt.status == RefineStatus::kAmbiguous ||
+       attempt.status == RefineStatus::kKeptPrior) &&
+      IsClearlyDifferent(attempt.alignment.cam_from_world, prior.cam_from_world);
+  int64_t search_ns = attempt.search_ns;
+  if (may_widen) {
+    PosePrior wide = prior;
+    wide.position_sigma_m *= kWideningFactor;
+    wide.rotation_sigma_rad *= kWideningFactor;
+    const Attempt second = Try(input, wide, std::min(kMaxHypotheses, 2 * options_.num_hypotheses));
+    search_ns += second.search_ns;
+    if (second.status == RefineStatus::kRefined) {
+      attempt = second;
+      prior = wide;
+    }
+  }
+
+  result->status = attempt.status;
+  result->map_support = attempt.evidence.refined.map_share;
+  result->runner_up_ratio = attempt.evidence.runner_up_ratio;
+  result->num_observed_directions = attempt.evidence.num_observed_directions;
+  if (attempt.status == RefineStatus::kRefined) {
+    FineAlignment& alignment = attempt.alignment;
+    FinishOnLocalLines(input, WeakFactor(prior), &alignment);
+    FinishWithPoints(input, WeakFactor(prior), &alignment);
+    const Matrix6d prior_information = PriorInformation(prior);
+    const double factor = index_.map().covariance_factor;
+    const Matrix6d information =
+        alignment.line_information + alignment.residual_scale * alignment.point_information;
+    result->cam_from_world = alignment.cam_from_world;
+    result->covariance =
+        PoseCovariance(information, alignment.residual_scale, factor, prior_information);
+    result->num_observed_directions =
+        Observe(information / (alignment.residual_scale * factor), prior_information).num_observed;
+    result->num_points_used = static_cast<uint32_t>(alignment.num_points);
+  }
+  ReportMatches(input.camera, result->cam_from_world, result);
+  result->search_ns = search_ns;
+  result->match_and_refine_ns = NowNs() - start_ns - search_ns;
+}
+
+SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrior& prior,
+                                        uint32_t num_hypotheses) {
+  Attempt attempt;
+  attempt.alignment.cam_from_world = prior.cam_from_world;
+  selector_.SelectForSearch(input.camera, prior.cam_from_world, prior.rotation_sigma_rad,
+                            &search_lines_);
+  if (search_lines_.size() < kMinLines || segments_.segments.size() < kMinSegments) return attempt;
+
+  const int64_t start_ns = NowNs();
+  const std::span<const FoundPose> starts = FindStarts(input, prior, num_hypotheses);
+  attempt.search_ns = NowNs() - start_ns;
+  const auto schedule = input.search ? FineSchedule() : StreamSchedule();
+  survivors_.clear();
+  for (const FoundPose& start : starts) {
+    selector_.SelectForAlignment(input.camera, start.cam_from_world, &fine_lines_);
+    if (fine_lines_.size() < kMinLines) continue;
+    Survivor survivor;
+    survivor.alignment = aligner_.Align(input.camera, start.cam_from_world, fine_lines_, segments_,
+                                        schedule, WeakFactor(prior));
+    survivor.support = MeasureSupport(input.camera, survivor.alignment.cam_from_world);
+    survivors_.push_back(survivor);
+  }
+  if (survivors_.empty()) return attempt;
+  const Survivor& best = *std::max_element(
+      survivors_.begin(), survivors_.end(),
+      [](const Survivor& a, const Survivor& b) { return a.support.Value() < b.support.Value(); });
+  double runner_up = 0.0;
+  for (const Survivor& survivor : survivors_) {
+    if (IsClearlyDifferent(survivor.alignment.cam_from_world, best.alignment.cam_from_world)) {
+      runner_up = std::max(runner_up, survivor.support.Value());
+    }
+  }
+  const double value = best.support.Value();
+  const double common_scale =
+      std::max(best.alignment.residual_scale, 1.0) * index_.map().covariance_factor;
+  attempt.alignment = best.alignment;
+  attempt.evidence = {
+      .refined = best.support,
+      .prior = MeasureSupport(input.camera, prior.cam_from_world),
+      .runner_up_ratio = value > 0.0 ? runner_up / value : 0.0,
+      .num_pairs = best.alignment.num_pairs,
+      .num_observed_directions =
+          Observe(best.alignment.line_information / common_scale, PriorInformation(prior))
+              .num_observed};
+  attempt.status = Decide(attempt.evidence, {.min_map_support = options_.min_map_support,
+                                             .min_gain = input.search ? kSearchGain : kStreamGain});
+  return attempt;
+}
+
+std::span<const FoundPose> SearchMethod::FindStarts(const RefineInput& input,
+                                                    const PosePrior& prior,
+                                                    uint32_t num_hypotheses) {
+  if (!input.search) {
+    only_prior_[0] = {prior.cam_from_world, 0.0};
+    return only_prior_;
+  }
+  lines_to_find_.clear();
+  for (const CandidateLine& line : search_lines_) {
+    lines_to_find_.push_back({line.segment_in_world, line.weight});
+  }
+  return pose_search_.Search(
+      input.camera, {prior.cam_from_world, prior.rotation_sigma_rad, prior.position_sigma_m},
+      lines_to_find_, segments_.segments,
+      {.num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors},
+      MixSeeds(options_.seed, input.seed));
+}
+
+PoseSupport SearchMethod::MeasureSupport(const Camera& camera, const Rigid3& cam_from_world) {
+  ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
+  return support_meter_.Measure(projected_, segments_.table);
+}
+
+void SearchMethod::FinishOnLocalLines(const RefineInput& input, const PosePriorFactor& prior,
+                                      FineAlignment* alignment) {
+  selector_.SelectLocal(input.camera, alignment->cam_from_world, &local_lines_);
+  if (local_lines_.size() < kMinLocalLines) return;
+  *alignment = aligner_.Align(input.camera, alignment->cam_from_world, local_lines_, segments_,
+                              LocalSchedule(), prior);
+}
+
+void SearchMethod::FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
+                                    FineAlignment* alignment) {
+  points_.clear();
+  for (const PointMatch& match : input.points) {
+    const Eigen::Vector3d x = alignment->cam_from_world * match.point_in_world;
+    if (!(x.z() > kNearPlane)) continue;
+    if (!((input.camera.Project(x) - match.pixel).norm() < kPointGatePx)) continue;
+    points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
+  }
+  if (points_.size() < kMinPoints) return;
+  const std::vector<CandidateLine>& lines =
+      local_lines_.size() < kMinLocalLines ? fine_lines_ : local_lines_;
+  *alignment = aligner_.Align(input.camera, alignment->cam_from_world, lines, segments_,
+                              JointSchedule(), prior, points_);
+}
+
+void SearchMethod::ReportMatches(const Camera& camera, const Rigid3& cam_from_world,
+                                 RefineResult* result) {
+  selector_.SelectForAlignment(camera, cam_from_world, &fine_lines_);
+  ProjectCandidates(camera, cam_from_world, fine_lines_, kMinVisiblePx, &projected_);
+  associator_.Associate(projected_, segments_.table, kMatchGates, &pairs_);
+  best_pair_.assign(segments_.segments.size(), -1);
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    int32_t& best = best_pair_[pairs_[p].segment];
+    if (best < 0 || pairs_[p].weight > pairs_[static_cast<size_t>(best)].weight) {
+      best = static_cast<int32_t>(p);
+    }
+  }
+  for (size_t s = 0; s < best_pair_.size(); ++s) {
+    if (best_pair_[s] < 0) continue;
+    const LinePair& pair = pairs_[static_cast<size_t>(best_pair_[s])];
+    result->matches.push_back({.segment = segments_.source[s],
+                               .line = fine_lines_[pair.line].id,
+                               .distance_px = std::sqrt(static_cast<double>(pair.square_px2))});
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,71 @@
+// The default method: search over the prior's uncertainty, then soft annealed association.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "plumb/map/map_index.h"
+#include "plumb/matching/candidate_line.h"
+#include "plumb/matching/support.h"
+#include "plumb/runtime/acceptance_gate.h"
+#include "plumb/runtime/fine_alignment.h"
+#include "plumb/runtime/line_selection.h"
+#include "plumb/runtime/pose_refiner.h"
+#include "plumb/search/pose_search.h"
+
+namespace plumb {
+
+/// One per PoseRefiner; input must have been checked. Owns all work space.
+/// Source: docs/method/association.md, "search".
+class SearchMethod {
+ public:
+  SearchMethod(const MapIndex& index, const PoseRefinerOptions& options);
+
+  void Refine(const RefineInput& input, RefineResult* result);
+
+ private:
+  static constexpr size_t kMaxSurvivors = 4;
+
+  /// One try to find the pose within an uncertainty.
+  struct Attempt {
+    RefineStatus status = RefineStatus::kLowSupport;
+    GateEvidence evidence;
+    FineAlignment alignment;  // of the best pose, on the fused lines
+    int64_t search_ns = 0;
+  };
+  struct Survivor {
+    FineAlignment alignment;
+    PoseSupport support;
+  };
+
+  Attempt Try(const RefineInput& input, const PosePrior& prior, uint32_t num_hypotheses);
+  std::span<const FoundPose> FindStarts(const RefineInput& input, const PosePrior& prior,
+                                        uint32_t num_hypotheses);
+  PoseSupport MeasureSupport(const Camera& camera, const Rigid3& cam_from_world);
+  void FinishOnLocalLines(const RefineInput& input, const PosePriorFactor& prior,
+                          FineAlignment* alignment);
+  void FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
+                        FineAlignment* alignment);
+  void ReportMatches(const Camera& camera, const Rigid3& cam_from_world, RefineResult* result);
+
+  const MapIndex& index_;
+  const PoseRefinerOptions options_;
+  LineSelector selector_;
+  FrameSegments segments_;
+  std::vector<CandidateLine> search_lines_;  // visible from the prior; all supports use them
+  std::vector<CandidateLine> fine_lines_, local_lines_;
+  std::vector<SearchLine> lines_to_find_;
+  PoseSearch pose_search_;
+  std::array<FoundPose, 1> only_prior_;
+  FineAligner aligner_;
+  SupportMeter support_meter_;
+  ProjectedLines projected_;
+  std::vector<Survivor> survivors_;
+  std::vector<PointObservation> points_;
+  SoftAssociator associator_;
+  std::vector<LinePair> pairs_;
+  std::vector<int32_t> best_pair_;  // per segment
+};
+
+}  // namespace plumb

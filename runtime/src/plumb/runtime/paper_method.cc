@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "plumb/geometry/line_projection.h"
 #include "plumb/refine/uncertainty.h"

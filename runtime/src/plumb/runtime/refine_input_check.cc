@@ -1,6 +1,8 @@
 #include "plumb/runtime/refine_input_check.h"
 
 #include <cmath>
+#include <cstdio>
+#include <initializer_list>
 #include <string>
 
 namespace plumb {
@@ -18,29 +20,34 @@ bool IsPixel(const Eigen::Vector2d& p) {
   return std::abs(p.x()) < kMaxPixel && std::abs(p.y()) < kMaxPixel;  // False for NaN.
 }
 
-std::string Text(const Eigen::Vector2d& p) {
-  return "(" + std::to_string(p.x()) + ", " + std::to_string(p.y()) + ")";
+// "(1.5, nan)"
+std::string Text(std::initializer_list<double> values) {
+  std::string text;
+  for (const double value : values) {
+    char number[32];
+    std::snprintf(number, sizeof(number), "%.6g", value);
+    text += text.empty() ? "(" : ", ";
+    text += number;
+  }
+  text += ")";
+  return text;
 }
-std::string Text(const Eigen::Vector3d& p) {
-  return "(" + std::to_string(p.x()) + ", " + std::to_string(p.y()) + ", " + std::to_string(p.z()) +
-         ")";
-}
+std::string Text(const Eigen::Vector2d& p) { return Text({p.x(), p.y()}); }
+std::string Text(const Eigen::Vector3d& p) { return Text({p.x(), p.y(), p.z()}); }
 
 Status CheckCamera(const Camera& camera) {
   if (camera.IsValid()) return Ok();
-  return Invalid("camera has fx " + std::to_string(camera.fx) + ", fy " +
-                 std::to_string(camera.fy) + ", cx " + std::to_string(camera.cx) + ", cy " +
-                 std::to_string(camera.cy) + " and " + std::to_string(camera.width_px) + " x " +
-                 std::to_string(camera.height_px) +
-                 " pixels; focal lengths must be finite and not 0, the size positive");
+  return Invalid(
+      "camera with (fx, fy, cx, cy) = " + Text({camera.fx, camera.fy, camera.cx, camera.cy}) +
+      " and " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) +
+      " pixels is not a camera: focal lengths are finite and not 0, sizes positive");
 }
 
 Status CheckPrior(const PosePrior& prior) {
   const Eigen::Quaterniond& q = prior.cam_from_world.rotation;
   if (!q.coeffs().allFinite() || !(std::abs(q.norm() - 1.0) < kUnitTolerance)) {
-    return Invalid("prior rotation (x, y, z, w) = (" + std::to_string(q.x()) + ", " +
-                   std::to_string(q.y()) + ", " + std::to_string(q.z()) + ", " +
-                   std::to_string(q.w()) + ") is not a finite unit quaternion");
+    return Invalid("prior rotation (x, y, z, w) = " + Text({q.x(), q.y(), q.z(), q.w()}) +
+                   " is not a finite unit quaternion");
   }
   if (!prior.cam_from_world.translation.allFinite()) {
     return Invalid("prior translation " + Text(prior.cam_from_world.translation) +

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
-#include "plumb/refine/joint_solver.h"
+#include "plumb/geometry/line_projection.h"
 #include "plumb/refine/uncertainty.h"
 
 namespace plumb {

@@ -42,16 +42,14 @@ TEST_F(DeviceTest, TheListHoldsTheOpenDevice) {
 TEST_F(DeviceTest, IsFoundByIndexAndByName) {
   for (const std::string& selector :
        {std::to_string(device_->Info().index), device_->Info().name}) {
-    const Result<std::shared_ptr<Device>> device =
-        Device::Create({.selector = selector, .validation = false, .log = {}});
+    const Result<std::shared_ptr<Device>> device = Device::Create({.selector = selector});
     PLUMB_ASSERT_OK(device);
     EXPECT_EQ((*device)->Info().name, device_->Info().name);
   }
 }
 
 TEST_F(DeviceTest, AnUnknownSelectorIsNamedInTheError) {
-  const Result<std::shared_ptr<Device>> device =
-      Device::Create({.selector = "no such device", .validation = false, .log = {}});
+  const Result<std::shared_ptr<Device>> device = Device::Create({.selector = "no such device"});
   ASSERT_FALSE(device);
   EXPECT_EQ(device.error().code, ErrorCode::kNotFound);
   EXPECT_THAT(device.error().message, HasSubstr("'no such device'"));
@@ -71,8 +69,7 @@ TEST_F(DeviceTest, TheLogAnnouncesTheDeviceAndSaysIfItIsSoftware) {
 }
 
 TEST_F(DeviceTest, WithoutValidationThereAreNoMessages) {
-  const Result<std::shared_ptr<Device>> device =
-      Device::Create({.selector = "auto", .validation = false, .log = {}});
+  const Result<std::shared_ptr<Device>> device = Device::Create({.selector = "auto"});
   PLUMB_ASSERT_OK(device);
   EXPECT_EQ((*device)->NumValidationMessages(), 0u);
 }

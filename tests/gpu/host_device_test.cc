@@ -108,8 +108,7 @@ TEST_F(HostDeviceTest, RunsAKernelAndLocksTheQueueAroundEverySubmission) {
                                .spirv = shaders::Find("test/texel_copy"),
                                .bindings = {{0, BindingKind::kTexelRgba32F, Access::kRead},
                                             {1, BindingKind::kStorage, Access::kWrite}},
-                               .push_constant_bytes = 4,
-                               .spec_constants = {}});
+                               .push_constant_bytes = 4});
   PLUMB_ASSERT_OK(copy);
   auto in = Buffer::Create(*device, {"in", 32, MemoryUse::kUpload});
   auto out = Buffer::Create(*device, {"out", 32, MemoryUse::kReadback});

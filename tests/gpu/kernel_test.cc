@@ -69,11 +69,11 @@ TEST(ShaderRegistry, FindsEveryNameAndNothingElse) {
 class LoopBudgetTest : public KernelTest {
  protected:
   uint32_t CountIterations(uint32_t outer, uint32_t inner) {
-    auto kernel = Kernel::Create(device_, {.name = "loop_budget",
-                                           .spirv = shaders::Find("test/loop_budget"),
-                                           .bindings = {{0, BindingKind::kStorage, Access::kRead},
-                                                        {1, BindingKind::kStorage, Access::kWrite}},
-                                           .spec_constants = {}});
+    auto kernel =
+        Kernel::Create(device_, {.name = "loop_budget",
+                                 .spirv = shaders::Find("test/loop_budget"),
+                                 .bindings = {{0, BindingKind::kStorage, Access::kRead},
+                                              {1, BindingKind::kStorage, Access::kWrite}}});
     PLUMB_EXPECT_OK(kernel);
     const auto limits = MakeBuffer(std::vector<uint32_t>{outer, inner});
     const auto out = MakeBuffer(std::vector<uint32_t>{0});

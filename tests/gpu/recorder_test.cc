@@ -204,8 +204,7 @@ TEST_F(RecorderTest, TexelBuffersReadTheirSlice) {
                                 .spirv = shaders::Find("test/texel_copy"),
                                 .bindings = {{0, BindingKind::kTexelRgba32F, Access::kRead},
                                              {1, BindingKind::kStorage, Access::kWrite}},
-                                .push_constant_bytes = 4,
-                                .spec_constants = {}});
+                                .push_constant_bytes = 4});
   const uint64_t offset = device_->Info().limits.buffer_offset_alignment;
   std::vector<float> values(offset / 4 + 40);
   std::iota(values.begin(), values.end(), 0.0f);
@@ -228,8 +227,7 @@ TEST_F(RecorderTest, AccessesThroughAddressesGetBarriers) {
   const auto twice = MakeKernel({.name = "address_double",
                                  .spirv = shaders::Find("test/address_double"),
                                  .bindings = {},
-                                 .push_constant_bytes = sizeof(Push),
-                                 .spec_constants = {}});
+                                 .push_constant_bytes = sizeof(Push)});
   const auto a = Constant(1.0f), b = Constant(0.0f);
   for (int i = 0; i < 5; ++i) {
     const Buffer &from = i % 2 == 0 ? *a : *b, &to = i % 2 == 0 ? *b : *a;

@@ -32,7 +32,7 @@ class GpuTest : public ::testing::Test {
     if (!devices) GTEST_SKIP() << devices.error().message;
     if ((*devices).empty()) GTEST_SKIP() << "no Vulkan device";
     static Result<std::shared_ptr<gpu::Device>> device =
-        gpu::Device::Create({.selector = "auto", .validation = true, .log = {}});
+        gpu::Device::Create({.selector = "auto", .validation = true});
     PLUMB_ASSERT_OK(device);
     device_ = *device;
     device_->ClearValidationMessages();

@@ -23,17 +23,18 @@ namespace plumb {
 struct VlseDetectorOptions {
   /// The weights: a safetensors file with plumb.model/1 metadata, or its bytes (borrowed during
   /// Create()). Exactly one of the two.
-  std::string model_path;
-  std::span<const std::byte> model_data;
+  std::string model_path = {};
+  std::span<const std::byte> model_data = {};
 
-  std::shared_ptr<gpu::Device> device;  ///< Shared with others; null: opened by `device_options`.
-  gpu::DeviceOptions device_options;
+  std::shared_ptr<gpu::Device> device =
+      nullptr;  ///< Shared with others; null: opened by `device_options`.
+  gpu::DeviceOptions device_options = {};
   nn::KernelFamily family = nn::KernelFamily::kAuto;
 
   int input_width_px = 0,
-      input_height_px = 0;               ///< Of the network, multiples of 64; 0: the model's.
-  std::optional<float> score_threshold;  ///< 0..1; absent: the model's.
-  std::optional<int> max_lines;          ///< 1..4096; absent: the model's.
+      input_height_px = 0;                    ///< Of the network, multiples of 64; 0: the model's.
+  std::optional<float> score_threshold = {};  ///< 0..1; absent: the model's.
+  std::optional<int> max_lines = {};          ///< 1..4096; absent: the model's.
 
   /// Run once on a black image, so that drivers which compile at the first use do it in Create().
   bool warm_up = true;

@@ -22,7 +22,7 @@ struct DeviceOptions {
   /// Device::ValidationMessages(). kUnsupported from Create() where the layer is not installed.
   bool validation = false;
   /// Called with one line per remark, on the thread that caused it. May be empty.
-  std::function<void(const std::string&)> log;
+  std::function<void(const std::string&)> log = {};
 };
 
 /// A device that the host program owns. All handles are Vulkan's, passed through as pointers; they

@@ -48,9 +48,9 @@ struct SpecConstant {
 struct KernelInfo {
   std::string name;                 // for error messages and debuggers
   std::span<const uint32_t> spirv;  // shaders/registry.h; read during Create() only
-  std::vector<KernelBinding> bindings;
+  std::vector<KernelBinding> bindings = {};
   uint32_t push_constant_bytes = 0;  // multiple of 4
-  std::vector<SpecConstant> spec_constants;
+  std::vector<SpecConstant> spec_constants = {};
 };
 
 /// A pipeline, compiled at Create(); lavapipe compiles at the first dispatch instead.

@@ -1,0 +1,81 @@
+// plumbline synth: a rendered room as a posed RGB-D sequence.
+#include <memory>
+#include <string>
+
+#include "tools/plumbline/commands.h"
+#include "tools/plumbline/console.h"
+#include "tools/plumbline/json_report.h"
+#include "tools/plumbline/output_directory.h"
+#include "tools/synth/sequence_writer.h"
+
+namespace plumb::tools {
+namespace {
+
+struct SynthOptions {
+  synth::SequenceOptions sequence;
+  std::string out;
+  bool json = false;
+};
+
+Outcome RunSynth(const SynthOptions& options) {
+  if (const Status valid = options.sequence.Validate(); !valid) {
+    return Failure{kExitUsage, valid.error().message};
+  }
+  OutputDirectory output;
+  if (Outcome failed = output.Open(options.out, "camera.json")) return failed;
+  {
+    ProgressBar progress("synth", static_cast<size_t>(options.sequence.num_frames));
+    const Status written = synth::WriteSequence(options.sequence, output.path(),
+                                                [&](int, int) { progress.Advance(); });
+    if (!written) return Failure{kExitIo, written.error().message};
+  }
+  if (Outcome failed = output.Commit()) return failed;
+  if (options.json) {
+    return PrintJson({{"sequence", options.out},
+                      {"frames", options.sequence.num_frames},
+                      {"seed", options.sequence.seed}});
+  }
+  return PrintText(options.out + ": " + std::to_string(options.sequence.num_frames) +
+                   " frames of room " + std::to_string(options.sequence.seed) + "\n");
+}
+
+}  // namespace
+
+void AddSynth(CLI::App& program, PendingRun& pending) {
+  AddCommand<SynthOptions>(
+      program, pending, "synth", "Render a furnished room as a posed RGB-D sequence",
+      [](CLI::App& command, SynthOptions& options) {
+        synth::SequenceOptions& s = options.sequence;
+        command.add_option("--out", options.out, "Directory to create")->required();
+        command.add_option("--seed", s.seed, "Room and camera path")->capture_default_str();
+        command.add_option("--frames", s.num_frames, "Frames")->capture_default_str();
+        command.add_option("--map-every", s.map_every, "Every so many frames is a map frame")
+            ->capture_default_str();
+        command.add_option("--width", s.width_px, "Image width [px]")->capture_default_str();
+        command.add_option("--height", s.height_px, "Image height [px]")->capture_default_str();
+        command.add_option("--focal", s.focal_px, "Focal length [px]")->capture_default_str();
+        command.add_option("--sweep", s.sweep_deg, "Turn of the camera in all [deg]")
+            ->capture_default_str();
+        command
+            .add_option("--depth-noise", s.depth_noise,
+                        "Standard deviation of the depth at 1 m [m]; grows with its square")
+            ->capture_default_str();
+        command.add_option("--image-noise", s.image_noise, "Standard deviation [grey levels]")
+            ->capture_default_str();
+        command.add_option("--samples", s.samples_per_axis, "Rays a pixel = square of this")
+            ->capture_default_str();
+        command.add_flag("!--no-shadows", s.shadows, "Lamps shine through furniture");
+        command.add_flag("--png", s.png, "Exact colour images instead of JPEG");
+        command.add_flag("--json", options.json, "Print {sequence, frames, seed}");
+        command.footer(
+            "Writes the layout of TUM RGB-D with exact poses, exact 3D edges (lines3d.txt), their\n"
+            "visible parts (annotations.json), map and query frames and priors that are off.\n"
+            "Examples:\n"
+            "  plumbline synth --out room --seed 2 --frames 48\n"
+            "  plumbline synth --out tiny --frames 6 --width 320 --height 240 --samples 1\n"
+            "  plumbline synth --out noisy --depth-noise 0.002 --image-noise 4");
+      },
+      RunSynth);
+}
+
+}  // namespace plumb::tools

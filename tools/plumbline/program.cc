@@ -27,6 +27,7 @@ void AddCommands(CLI::App& program, PendingRun& pending) {
   CLI::App& eval = AddGroup(program, "eval", "Score detections or refined poses");
   AddEvalLines(eval, pending);
   AddEvalTrajectory(eval, pending);
+  AddSynth(program, pending);
   AddVersion(program, pending);
 }
 

@@ -19,10 +19,10 @@ except ImportError:
 if torch is not None:
     import data
     import export_safetensors
+    import flat
     import weights_file
     from make_oracle import randomise
     from model import PRESETS, Vlse, build, exported_state
-    from optimizer import orthogonal
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
@@ -96,10 +96,31 @@ class Model(unittest.TestCase):
             model.stack0.remap_score.weight.mul_(0)
         self.assertFalse(torch.equal(before, model(x)))
 
-    def test_orthogonal_factor_has_singular_values_near_one(self):
-        g = torch.randn(3, 8, 40, generator=torch.Generator().manual_seed(0))
-        values = torch.linalg.svdvals(orthogonal(g))
-        self.assertTrue(((values > 0.6) & (values < 1.3)).all(), values)
+    def test_flat_optimiser_steps_the_model_like_the_plain_one(self):
+        torch.manual_seed(0)
+        first = Vlse(2, block="basic")
+        second = Vlse(2, block="basic")
+        second.load_state_dict(first.state_dict())
+        joined = flat.Flat(second)
+        average = flat.Average(joined, 0.0)
+        plain = torch.optim.AdamW(first.parameters(), 1e-2, weight_decay=0.0)
+        fused = torch.optim.AdamW([joined.decayed, joined.plain], 1e-2, weight_decay=0.0)
+        for _ in range(2):
+            x = torch.randn(2, 3, 64, 64)
+            for model in (first, second):
+                model.zero_grad()
+                maps, aux = model.forward_all(x)[-1]
+                (maps.square().mean() + aux.square().mean()).backward()
+            joined.gather()
+            plain.step()
+            fused.step()
+            average.update()
+        for (name, a), b in zip(first.state_dict().items(), second.state_dict().values()):
+            torch.testing.assert_close(a, b, msg=name)
+        state = second.state_dict()
+        for name, value in average.state().items():  # an average without memory is the model
+            self.assertTrue(torch.equal(value, state[name]), name)
+        self.assertEqual(set(average.state()), {n for n in state if not n.endswith("tracked")})
 
 
 @unittest.skipIf(torch is None, "torch is not installed")

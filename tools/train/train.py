@@ -14,11 +14,12 @@ import torch
 
 import evaluate
 from data import TRAINING, Batches, load, split
+from flat import Average, Flat
 from losses import total_loss
 from model import PRESETS, build
-from optimizer import Muon
 
-STATE_VERSION = 1
+STATE_VERSION = 2
+MAX_GRADIENT = 20.0
 
 
 def parse_arguments(argv=None):
@@ -31,7 +32,6 @@ def parse_arguments(argv=None):
     parser.add_argument("--size", type=int, default=320, help="input edge in pixels, divisible by 64")
     parser.add_argument("--evaluate-size", type=int, default=320)
     parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--optimizer", choices=("adamw", "muon"), default="adamw")
     parser.add_argument("--lr", type=float, default=2e-3)
     parser.add_argument("--weight-decay", type=float, default=0.05)
     parser.add_argument("--warmup-steps", type=int, default=200)
@@ -50,47 +50,6 @@ def parse_arguments(argv=None):
     return parser.parse_args(argv)
 
 
-class Average:
-    """Exponential moving average of all floating tensors of a model, with a short memory in the beginning."""
-
-    def __init__(self, model, decay):
-        self.decay, self.count = decay, 0
-        self.source = [v for v in model.state_dict().values() if v.dtype.is_floating_point]
-        self.names = [k for k, v in model.state_dict().items() if v.dtype.is_floating_point]
-        self.values = [v.detach().clone() for v in self.source]
-
-    @torch.no_grad()
-    def update(self):
-        self.count += 1
-        keep = min(self.decay, (1 + self.count) / (10 + self.count))
-        torch._foreach_mul_(self.values, keep)
-        torch._foreach_add_(self.values, self.source, alpha=1 - keep)
-
-    def state(self):
-        return dict(zip(self.names, self.values))
-
-    @torch.no_grad()
-    def restore(self, tensors, count):
-        self.count = count
-        for name, value in zip(self.names, self.values):
-            value.copy_(tensors[name])
-
-
-def make_optimizers(model, args):
-    """Muon for the kernels of the trunk, AdamW for the rest; or AdamW for all."""
-    named = list(model.named_parameters())
-    kernels, rest = [], []
-    for name, p in named:
-        inner = p.ndim == 4 and name != "stem.conv.weight" and ".head." not in name and ".aux." not in name
-        (kernels if inner and args.optimizer == "muon" else rest).append(p)
-    plain = [p for p in rest if p.ndim < 2]
-    groups = [{"params": [p for p in rest if p.ndim >= 2]}, {"params": plain, "weight_decay": 0.0}]
-    optimizers = [torch.optim.AdamW(groups, lr=args.lr, betas=(0.9, 0.99), weight_decay=args.weight_decay, foreach=True)]
-    if kernels:
-        optimizers.append(Muon(kernels, lr=args.lr, weight_decay=args.weight_decay))
-    return optimizers
-
-
 class Team:
     """The processes that share each batch: sums gradients, and stops all of them at the same step."""
 
@@ -99,17 +58,15 @@ class Team:
         if self.size > 1:
             torch.distributed.init_process_group("gloo")
 
-    def share(self, params, stop):
-        """Averages the gradients of `params` over the team; true if any process wants to stop."""
+    def share(self, gradient, stop):
+        """Averages the flat `gradient` over the team in place; true if any process wants to stop."""
         if self.size == 1:
             return stop
-        grads = [p.grad for p in params]
-        flat = torch.cat([g.flatten() for g in grads] + [torch.full((1,), float(stop), device=grads[0].device)])
-        torch.distributed.all_reduce(flat)
-        parts = flat.split([g.numel() for g in grads] + [1])
-        for grad, part in zip(grads, parts):
-            grad.copy_(part.view_as(grad) / self.size)
-        return bool(parts[-1] > 0)
+        flag = torch.tensor([float(stop)])
+        torch.distributed.all_reduce(gradient)
+        torch.distributed.all_reduce(flag)
+        gradient /= self.size
+        return bool(flag > 0)
 
 
 class Run:
@@ -120,17 +77,19 @@ class Run:
         torch.manual_seed(args.seed)
         self.device = torch.device(args.device)
         self.model = build(args.preset).to(self.device, memory_format=torch.channels_last)
-        self.optimizers = make_optimizers(self.model, args)
-        self.average = Average(self.model, args.ema)
+        self.flat = Flat(self.model)
+        groups = [{"params": [self.flat.decayed]}, {"params": [self.flat.plain], "weight_decay": 0.0}]
+        self.optimizer = torch.optim.AdamW(groups, lr=args.lr, betas=(0.9, 0.99), weight_decay=args.weight_decay)
+        self.average = Average(self.flat, args.ema)
         self.epoch = self.index = self.step = self.images = 0
         self.seconds = 0.0
         self.decay_start = None  # in epochs, once the learning rate decays
 
     def save(self, path):
         state = {
-            "version": STATE_VERSION, "preset": self.args.preset, "optimizer": self.args.optimizer,
+            "version": STATE_VERSION, "preset": self.args.preset,
             "model": self.model.state_dict(), "average": self.average.state(), "average_count": self.average.count,
-            "optimizers": [o.state_dict() for o in self.optimizers],
+            "optimizer": self.optimizer.state_dict(),
             "epoch": self.epoch, "index": self.index, "step": self.step, "images": self.images,
             "seconds": self.seconds, "decay_start": self.decay_start, "seed": self.args.seed, "batch": self.args.batch,
         }
@@ -139,16 +98,15 @@ class Run:
 
     def restore(self, path):
         state = torch.load(path, map_location=self.device)
-        for key, value in (("version", STATE_VERSION), ("preset", self.args.preset), ("optimizer", self.args.optimizer)):
+        for key, value in (("version", STATE_VERSION), ("preset", self.args.preset)):
             if state[key] != value:
                 raise ValueError(f"{path} has {key} {state[key]}, not {value}")
         self.model.load_state_dict(state["model"])
         self.average.restore(state["average"], state["average_count"])
-        for optimizer, saved in zip(self.optimizers, state["optimizers"]):
-            hyper = [{k: v for k, v in g.items() if k != "params"} for g in optimizer.param_groups]
-            optimizer.load_state_dict(saved)
-            for group, values in zip(optimizer.param_groups, hyper):  # the command line decides, not the file
-                group.update(values)
+        hyper = [{k: v for k, v in g.items() if k != "params"} for g in self.optimizer.param_groups]
+        self.optimizer.load_state_dict(state["optimizer"])
+        for group, values in zip(self.optimizer.param_groups, hyper):  # the command line decides, not the file
+            group.update(values)
         for key in ("epoch", "index", "step", "images", "seconds", "decay_start"):
             setattr(self, key, state[key])
         if state["batch"] != self.args.batch:  # the place inside the epoch means nothing for another batch size
@@ -166,22 +124,22 @@ class Run:
 
     def train_step(self, images, maps, rate, stop):
         """One step at learning rate `rate`: (loss terms, whether the team stops)."""
-        self.model.train()
+        if not self.model.training:
+            self.model.train()
         x = evaluate.to_tensor(images).to(self.device)
         target = torch.from_numpy(maps).to(self.device)
         with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=self.args.precision == "bf16"):
             outputs = self.model.forward_all(x)
         fixed_sign = self.step < self.args.fixed_sign_steps
         loss, terms = total_loss(outputs, target, evaluate.DISPLACEMENT_SCALE, fixed_sign)
-        for optimizer in self.optimizers:
-            optimizer.zero_grad(set_to_none=True)
+        self.flat.forget()
         loss.backward()
-        stop = self.team.share(list(self.model.parameters()), stop)
-        torch.nn.utils.clip_grad_norm_(self.model.parameters(), 20.0)
-        for optimizer in self.optimizers:
-            for group in optimizer.param_groups:
-                group["lr"] = rate
-            optimizer.step()
+        gradient = self.flat.gather()
+        stop = self.team.share(gradient, stop)
+        gradient *= min(1.0, MAX_GRADIENT / (float(gradient.norm()) + 1e-6))
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate
+        self.optimizer.step()
         self.average.update()
         self.step += 1
         self.images += len(images) * self.team.size

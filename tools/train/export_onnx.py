@@ -8,7 +8,8 @@ import argparse
 import torch
 
 import weights_file
-from model import PRESETS, build
+from model import PRESETS
+from random_weights import random_model
 
 
 def main(argv=None):
@@ -19,7 +20,7 @@ def main(argv=None):
     parser.add_argument("--size", type=int, help="input edge in pixels; default: the file's or the preset's")
     args = parser.parse_args(argv)
     if args.random:
-        model, size = build(args.source).eval(), args.size or PRESETS[args.source].size
+        model, size = random_model(args.source), args.size or PRESETS[args.source].size
     else:
         model, metadata = weights_file.load_model(args.source)
         size = args.size or int(metadata["input_width"])

@@ -10,6 +10,7 @@ import torch
 import evaluate
 import weights_file
 from model import PRESETS, build
+from random_weights import random_model
 
 
 def load_state(path):
@@ -33,8 +34,7 @@ def main(argv=None):
     parser.add_argument("--description", default="")
     args = parser.parse_args(argv)
     if args.random:
-        torch.manual_seed(0)
-        model, preset, text = build(args.source).eval(), args.source, "random weights, for speed measurements only"
+        model, preset, text = random_model(args.source), args.source, "random weights, for speed measurements only"
     else:
         model, preset, images, minutes = load_state(args.source)
         text = f"{preset}, {images} training images seen"

@@ -18,11 +18,12 @@ except ImportError:
 
 if torch is not None:
     import data
+    import export_onnx
     import export_safetensors
     import flat
     import weights_file
-    from make_oracle import randomise
     from model import PRESETS, Vlse, build, exported_state
+    from random_weights import randomise
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
@@ -163,6 +164,19 @@ class WeightsFile(unittest.TestCase):
             _, metadata = weights_file.read(path)
         self.assertEqual((metadata["width"], metadata["stacks"], metadata["block"]), ("16", "1", "hybrid"))
         self.assertEqual(metadata["input_width"], str(PRESETS["nano"].size))
+
+    def test_onnx_in_opencv_gives_the_output_of_the_random_weights_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            onnx, path = os.path.join(folder, "m.onnx"), os.path.join(folder, "m.safetensors")
+            export_onnx.main(["--random", "nano", onnx, "--size", "64"])
+            export_safetensors.main(["--random", "nano", path, "--fp32"])
+            model, _ = weights_file.load_model(path)
+            net = cv2.dnn.readNetFromONNX(onnx)
+        x = torch.randn(1, 3, 64, 64)
+        net.setInput(x.numpy())
+        with torch.no_grad():
+            expected = model(x).numpy()
+        np.testing.assert_allclose(net.forward(), expected, rtol=1e-3, atol=1e-3 * np.abs(expected).max())
 
 
 @unittest.skipIf(torch is None, "torch is not installed")

@@ -37,26 +37,19 @@ MemoryPlan PlanMemory(std::span<const LiveRange> ranges, size_t alignment) {
   return plan;
 }
 
-std::vector<LiveRange> FeatureLifetimes(const LayerPlan& plan, std::span<const size_t> bytes) {
-  const int num_steps = static_cast<int>(plan.layers.size());
-  std::vector<LiveRange> ranges(plan.features.size());
+std::vector<LiveRange> LiveRanges(std::span<const std::vector<int>> steps,
+                                  std::span<const size_t> bytes) {
+  const int num_steps = static_cast<int>(steps.size());
+  std::vector<LiveRange> ranges(bytes.size());
   for (size_t i = 0; i < ranges.size(); ++i) {
     ranges[i] = {.bytes = bytes[i], .first = num_steps, .last = -1};
   }
-  const auto touch = [&](int feature, int step) {
-    if (feature < 0) return;
-    ranges[feature].first = std::min(ranges[feature].first, step);
-    ranges[feature].last = std::max(ranges[feature].last, step);
-  };
   for (int step = 0; step < num_steps; ++step) {
-    const Layer& layer = plan.layers[step];
-    for (const int feature :
-         {layer.input, layer.extra_input, layer.residual, layer.upsampled, layer.output}) {
-      touch(feature, step);
+    for (const int buffer : steps[step]) {
+      ranges[buffer].first = std::min(ranges[buffer].first, step);
+      ranges[buffer].last = std::max(ranges[buffer].last, step);
     }
   }
-  touch(plan.input, 0);
-  touch(plan.output, num_steps - 1);
   return ranges;
 }
 

@@ -5,8 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "plumb/nn/layer_plan.h"
-
 namespace plumb::nn {
 
 /// A buffer that is needed from step `first` to step `last`, both included.
@@ -26,8 +24,9 @@ struct MemoryPlan {
 /// @param alignment  at least 1.
 MemoryPlan PlanMemory(std::span<const LiveRange> ranges, size_t alignment);
 
-/// Live range of every feature of a plan with the given sizes; step = index of the layer. The
-/// plan's input lives from step 0, its output to the last step; unused features have last < first.
-std::vector<LiveRange> FeatureLifetimes(const LayerPlan& plan, std::span<const size_t> bytes);
+/// Live ranges from first to last use. @param steps  the buffers that each step touches, by index
+/// into `bytes`; buffers that no step touches get last < first.
+std::vector<LiveRange> LiveRanges(std::span<const std::vector<int>> steps,
+                                  std::span<const size_t> bytes);
 
 }  // namespace plumb::nn

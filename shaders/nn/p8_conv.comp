@@ -1,0 +1,268 @@
+#version 450
+// Convolution, stride 1, for Vulkan drivers that run on the CPU with 8 lanes (family cpu-simd).
+//
+// out = relu?(bias + sum over taps and inputs of weight * prologue(in)) + residual + upsampled,
+// prologue(x) = max(0, scale * x + shift). Taps by SHAPE: 0 1x1, 1 3x3, 2 cross of 17 (3x3, 7x1 and
+// 1x7 joined). Pixels outside the image count as zero.
+//
+// Every lane owns the 8 pixels of one block for all output channels: their inputs are loaded once
+// and stay in registers (in practice on the stack, where they are operands of plain vector
+// instructions), the loop runs over output channels, and each weight reaches the lanes by a shuffle
+// with a constant index out of a texel per lane. On these drivers this is the fast way to read:
+// loads from storage buffers and dynamically indexed arrays run lane by lane.
+//
+// Layout p8   [row][block of 8 columns][channel][8] fp32, rows padded with zeros to whole blocks,
+//             and buffers to whole groups of 8 blocks
+// Bindings    0 weights: [out][kRow] with taps fastest, then bias, then zeros up to a multiple of 32;
+//             then scale and shift, each padded to a multiple of 32
+//             1 in, 2 extra in (1x1), 3 residual or partial sum, 4 upsampled (half size), all p8
+//             5 out, p8 or planar [channel][row][column] (then width % 8 == 0)
+// Push        height and width of the image; address of the weights (variants _address)
+// Dispatch    x ceil(rows * blocks / 8), y divides kOut
+// Iterations  kOut / y per invocation
+// Reference   src/plumb/nn/reference/layer_reference.h     Test  tests/nn/cpu_simd_kernels_test.cc
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+#ifdef WEIGHT_ADDRESS
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#endif
+
+layout(local_size_x = 8) in;  // One subgroup.
+layout(constant_id = 0) const uint kIn = 32u;        // channels read of `in`
+layout(constant_id = 1) const uint kInFirst = 0u;    // the first of them
+layout(constant_id = 2) const uint kInTotal = 32u;   // channels that `in` has
+layout(constant_id = 3) const uint kExtra = 0u;      // the same for `extra`
+layout(constant_id = 4) const uint kExtraFirst = 0u;
+layout(constant_id = 5) const uint kExtraTotal = 0u;
+layout(constant_id = 6) const uint kOut = 32u;
+layout(constant_id = 7) const bool kPrologue = false;
+layout(constant_id = 8) const bool kRelu = false;
+layout(constant_id = 9) const uint kAdd = 0u;  // binding 3: 0 unused, 1 after ReLU, 2 before
+layout(constant_id = 10) const bool kUpsampled = false;
+layout(constant_id = 11) const bool kPlanarOut = false;
+
+layout(binding = 0) uniform samplerBuffer weights;
+layout(binding = 1) uniform samplerBuffer in_texels;
+layout(binding = 2) uniform samplerBuffer extra_texels;
+layout(binding = 3) uniform samplerBuffer add_texels;
+layout(binding = 4) uniform samplerBuffer low_texels;
+layout(scalar, binding = 5) writeonly buffer Out { dvec4 out_data[]; };
+#ifdef WEIGHT_ADDRESS
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Pair { uint64_t data; };
+layout(push_constant, scalar) uniform Push { int height; int width; uint64_t weights; } p;
+#else
+layout(push_constant, scalar) uniform Push { int height; int width; } p;
+#endif
+
+#if SHAPE == 0
+const uint kTaps = 1u, kSpan = 8u;
+#elif SHAPE == 1
+const uint kTaps = 9u, kSpan = 30u;  // three rows of 10
+#else
+const uint kTaps = 17u, kSpan = 66u;  // row 0: 14; rows -1, 1: 10 each; rows -3, -2, 2, 3: 8 each
+#endif
+const uint kK = kIn + kExtra;
+const uint kRow = (kTaps * kK + 1u + 31u) / 32u * 32u;
+const int kOutside = 0x3fff0000;  // Beyond every buffer: texelFetch returns 0 there.
+
+// Texel of channel kInFirst of a block; `blocks` are in a row.
+int BlockTexel(int row, int column, int blocks) {
+  const bool inside = row >= 0 && row < p.height && column >= 0 && column < blocks;
+  return inside ? 2 * ((row * blocks + column) * int(kInTotal) + int(kInFirst)) : kOutside;
+}
+
+// One texel per lane: 32 weights of a row from position `first` on, as w[n % 4] of lane n / 4 % 8
+// (texels) or in pairs from an address.
+vec4 FetchWeights(uint row_start, uint first, uint lane) {
+#ifdef WEIGHT_ADDRESS
+  const uint64_t at = p.weights + uint64_t(row_start + first + 2u * lane) * 4ul;
+  vec4 w;
+  w.xy = uintBitsToFloat(unpackUint2x32(Pair(at).data));
+  w.zw = uintBitsToFloat(unpackUint2x32(Pair(at + 64ul).data));
+  return w;
+#else
+  return texelFetch(weights, int((row_start + first) / 4u + lane));
+#endif
+}
+
+float Weight(vec4 w, uint n) {
+#ifdef WEIGHT_ADDRESS
+  return subgroupShuffle(w[n % 32u / 16u * 2u + n % 2u], n % 16u / 2u);
+#else
+  return subgroupShuffle(w[n % 4u], n % 32u / 4u);
+#endif
+}
+
+// Columns -reach .. 7 + reach of row `dy` of every channel, to `start` of its span.
+#define LOAD_ROW(dy, start, reach)                                           \
+  {                                                                          \
+    const int left = BlockTexel(row + dy, column - 1, blocks);                      \
+    const int middle = BlockTexel(row + dy, column, blocks);                       \
+    const int right = BlockTexel(row + dy, column + 1, blocks);                     \
+    [[unroll]] for (uint k = 0u; k < kK; ++k) {                              \
+      const uint at = kSpan * k + start;                                     \
+      const vec4 a = texelFetch(in_texels, left + int(2u * k + 1u));         \
+      const vec4 b = texelFetch(in_texels, middle + int(2u * k));            \
+      const vec4 c = texelFetch(in_texels, middle + int(2u * k + 1u));       \
+      const vec4 d = texelFetch(in_texels, right + int(2u * k));             \
+      [[unroll]] for (uint j = 0u; j < reach; ++j) {                         \
+        x[at + j] = a[4u - reach + j];                                       \
+        x[at + reach + 8u + j] = d[j];                                       \
+      }                                                                      \
+      [[unroll]] for (uint j = 0u; j < 4u; ++j) {                            \
+        x[at + reach + j] = b[j];                                            \
+        x[at + reach + 4u + j] = c[j];                                       \
+      }                                                                      \
+    }                                                                        \
+  }
+
+// The block's own 8 columns of row `dy`.
+#define LOAD_BLOCK(dy, start)                                          \
+  {                                                                    \
+    const int middle = BlockTexel(row + dy, column, blocks);                 \
+    [[unroll]] for (uint k = 0u; k < kK; ++k) {                        \
+      const uint at = kSpan * k + start;                               \
+      const vec4 b = texelFetch(in_texels, middle + int(2u * k));      \
+      const vec4 c = texelFetch(in_texels, middle + int(2u * k + 1u)); \
+      [[unroll]] for (uint j = 0u; j < 4u; ++j) {                      \
+        x[at + j] = b[j];                                              \
+        x[at + 4u + j] = c[j];                                         \
+      }                                                                \
+    }                                                                  \
+  }
+
+// Adds tap t of channel k, whose input for the block's first pixel lies at `base` of the span.
+#define TAP(t, base)                                                                             \
+  {                                                                                              \
+    const uint n = k * kTaps + t;                                                                \
+    if (n % 32u == 0u) w = FetchWeights(weight_row, n, lane);                                    \
+    const float value = Weight(w, n);                                                            \
+    [[unroll]] for (uint j = 0u; j < 8u; ++j) acc[j] = fma(value, x[kSpan * k + base + j], acc[j]); \
+  }
+
+void main() {
+  const uint lane = gl_SubgroupInvocationID;
+  const uint block = gl_WorkGroupID.x * 8u + lane;
+  const int blocks = (p.width + 7) / 8;
+  const int row = int(block) / blocks, column = int(block) % blocks;
+
+  float x[kK * kSpan];
+#if SHAPE == 0
+  const int own = int(2u * (block * kInTotal + kInFirst));
+  [[unroll]] for (uint k = 0u; k < kIn; ++k) {
+    const vec4 a = texelFetch(in_texels, own + int(2u * k));
+    const vec4 b = texelFetch(in_texels, own + int(2u * k + 1u));
+    [[unroll]] for (uint j = 0u; j < 4u; ++j) {
+      x[8u * k + j] = a[j];
+      x[8u * k + 4u + j] = b[j];
+    }
+  }
+  if (kPrologue) {
+    const uint scales = kOut * kRow / 4u, shifts = scales + (kIn + 31u) / 32u * 8u;
+    vec4 scale, shift;
+    [[unroll]] for (uint k = 0u; k < kIn; ++k) {
+      if (k % 32u == 0u) {
+        scale = texelFetch(weights, int(scales + k / 4u + lane));
+        shift = texelFetch(weights, int(shifts + k / 4u + lane));
+      }
+      const float s = subgroupShuffle(scale[k % 4u], k % 32u / 4u);
+      const float t = subgroupShuffle(shift[k % 4u], k % 32u / 4u);
+      [[unroll]] for (uint j = 0u; j < 8u; ++j) {
+        x[8u * k + j] = max(fma(s, x[8u * k + j], t), 0.0);
+      }
+    }
+  }
+  const int own_extra = int(2u * (block * kExtraTotal + kExtraFirst));
+  [[unroll]] for (uint k = 0u; k < kExtra; ++k) {
+    const vec4 a = texelFetch(extra_texels, own_extra + int(2u * k));
+    const vec4 b = texelFetch(extra_texels, own_extra + int(2u * k + 1u));
+    [[unroll]] for (uint j = 0u; j < 4u; ++j) {
+      x[8u * (kIn + k) + j] = a[j];
+      x[8u * (kIn + k) + 4u + j] = b[j];
+    }
+  }
+#else
+#if SHAPE == 1
+  LOAD_ROW(-1, 0u, 1u)
+  LOAD_ROW(0, 10u, 1u)
+  LOAD_ROW(1, 20u, 1u)
+#else
+  LOAD_ROW(0, 0u, 3u)
+  LOAD_ROW(-1, 14u, 1u)
+  LOAD_ROW(1, 24u, 1u)
+  LOAD_BLOCK(-3, 34u)
+  LOAD_BLOCK(-2, 42u)
+  LOAD_BLOCK(2, 50u)
+  LOAD_BLOCK(3, 58u)
+#endif
+#endif
+
+  // Splitting over workgroups in y keeps every thread busy on small planes.
+  const uint count = kOut / gl_NumWorkGroups.y;
+  const uint first = gl_WorkGroupID.y * count;
+  const uint plane = uint(p.height * blocks);
+  uint weight_row = first * kRow;
+  uint target = kPlanarOut ? first * plane + block : block * kOut + first;
+  int add = int(2u * (block * kOut + first));
+  // Half-size neighbour: the block's 8 pixels lie over 4 pixels, one texel.
+  const int low_blocks = (p.width / 2 + 7) / 8;
+  int low = 2 * ((row / 2 * low_blocks + column / 2) * int(kOut) + int(first)) + column % 2;
+  const int valid = p.width - 8 * column;
+  [[dont_unroll]] for (uint o = 0u; o < count; ++o) {
+    float acc[8];
+    [[unroll]] for (uint j = 0u; j < 8u; ++j) acc[j] = 0.0;
+    if (kAdd == 2u) {
+      const vec4 a = texelFetch(add_texels, add), b = texelFetch(add_texels, add + 1);
+      [[unroll]] for (uint j = 0u; j < 4u; ++j) {
+        acc[j] = a[j];
+        acc[4u + j] = b[j];
+      }
+    }
+    vec4 w;
+    [[unroll]] for (uint k = 0u; k < kK; ++k) {
+#if SHAPE == 0
+      TAP(0u, 0u)
+#elif SHAPE == 1
+      TAP(0u, 0u) TAP(1u, 1u) TAP(2u, 2u)
+      TAP(3u, 10u) TAP(4u, 11u) TAP(5u, 12u)
+      TAP(6u, 20u) TAP(7u, 21u) TAP(8u, 22u)
+#else
+      TAP(0u, 14u) TAP(1u, 15u) TAP(2u, 16u)
+      TAP(3u, 2u) TAP(4u, 3u) TAP(5u, 4u)
+      TAP(6u, 24u) TAP(7u, 25u) TAP(8u, 26u)
+      TAP(9u, 34u) TAP(10u, 42u) TAP(11u, 50u) TAP(12u, 58u)
+      TAP(13u, 0u) TAP(14u, 1u) TAP(15u, 5u) TAP(16u, 6u)
+#endif
+    }
+    if (kK * kTaps % 32u == 0u) w = FetchWeights(weight_row, kK * kTaps, lane);
+    const float bias = Weight(w, kK * kTaps);
+    [[unroll]] for (uint j = 0u; j < 8u; ++j) {
+      acc[j] += bias;
+      if (kRelu) acc[j] = max(acc[j], 0.0);
+    }
+    if (kAdd == 1u) {
+      const vec4 a = texelFetch(add_texels, add), b = texelFetch(add_texels, add + 1);
+      [[unroll]] for (uint j = 0u; j < 4u; ++j) {
+        acc[j] += a[j];
+        acc[4u + j] += b[j];
+      }
+    }
+    if (kUpsampled) {
+      const vec4 a = texelFetch(low_texels, low);
+      [[unroll]] for (uint j = 0u; j < 8u; ++j) acc[j] += a[j / 2u];
+    }
+    // The padding stays zero.
+    [[unroll]] for (int j = 0; j < 8; ++j) acc[j] = j < valid ? acc[j] : 0.0;
+    out_data[target] = dvec4(packDouble2x32(floatBitsToUint(vec2(acc[0], acc[1]))),
+                             packDouble2x32(floatBitsToUint(vec2(acc[2], acc[3]))),
+                             packDouble2x32(floatBitsToUint(vec2(acc[4], acc[5]))),
+                             packDouble2x32(floatBitsToUint(vec2(acc[6], acc[7]))));
+    weight_row += kRow;
+    target += kPlanarOut ? plane : 1u;
+    add += 2;
+    low += 2;
+  }
+}

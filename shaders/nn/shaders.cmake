@@ -13,3 +13,7 @@ foreach(suffix "" "_address")
 endforeach()
 plumb_add_shader(nn/p8_stem nn/p8_stem.comp NO_OPT)
 plumb_add_shader(nn/p8_max_pool nn/p8_max_pool.comp NO_OPT)
+
+# Family gpu.
+plumb_add_shader(nn/tile_conv nn/tile_conv.comp)
+plumb_add_shader(nn/tile_max_pool nn/tile_max_pool.comp)

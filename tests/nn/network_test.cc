@@ -82,6 +82,14 @@ TEST_F(NetworkOnDevice, AgreesWithPyTorch) {
   }
 }
 
+TEST_F(NetworkOnDevice, FamilyGpuAgreesWithPyTorch) {
+  for (const char* name : {"hybrid_1", "basic_2"}) {
+    const Oracle oracle = LoadOracle(name);
+    const auto output = Forward(oracle.model, {.family = KernelFamily::kGpu}, oracle.input);
+    EXPECT_LT(RelativeError(output, oracle.output), kTolerance) << name;
+  }
+}
+
 TEST_F(NetworkOnDevice, AgreesWithTheReferenceOnAnOddSize) {
   ModelSpec spec;
   spec.width = 8;

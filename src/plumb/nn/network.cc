@@ -6,6 +6,7 @@
 #include "plumb/nn/executor.h"
 #include "plumb/nn/layer_plan.h"
 #include "plumb/nn/ops/cpu_simd.h"
+#include "plumb/nn/ops/gpu_tiles.h"
 
 namespace plumb::nn {
 
@@ -43,7 +44,9 @@ Result<std::unique_ptr<Network>> Network::Create(std::shared_ptr<gpu::Device> de
   info.gmac = CountMacs(layers) * 1e-9;
   impl->input = layers.input;
   impl->output = layers.output;
-  const DispatchPlan plan = PlanCpuSimd(layers, ChooseCpuSimdOptions(device_info));
+  const DispatchPlan plan = info.family == KernelFamily::kCpuSimd
+                                ? PlanCpuSimd(layers, ChooseCpuSimdOptions(device_info))
+                                : PlanGpuTiles(layers);
   const ExecutorOptions executor_options{.own_buffers = {layers.input, layers.output}};
   auto executor = Executor::Create(std::move(device), plan, executor_options);
   if (!executor) return executor.error();

@@ -11,26 +11,25 @@ namespace {
 
 using Messages = std::vector<std::string>;
 
-void Append(LogLevel, const char* message, void* user) {
-  static_cast<Messages*>(user)->emplace_back(message);
-}
-
-class LogTest : public testing::Test {
+class LogTest : public ::testing::Test {
  protected:
-  void TearDown() override { SetLogSink(nullptr, nullptr, LogLevel::kWarning); }
+  void TearDown() override { SetLogSink({}, LogLevel::kWarning); }
+  LogSink Append() {
+    return [this](LogLevel, const char* message) { messages_.emplace_back(message); };
+  }
   Messages messages_;
 };
 
 TEST_F(LogTest, WithoutASinkNothingIsPrinted) {
-  testing::internal::CaptureStderr();
-  testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStdout();
   Log(LogLevel::kError, "nobody hears this");
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
 }
 
 TEST_F(LogTest, SinkGetsItsLevelAndAbove) {
-  SetLogSink(&Append, &messages_, LogLevel::kWarning);
+  SetLogSink(Append(), LogLevel::kWarning);
   Log(LogLevel::kInfo, "info");
   Log(LogLevel::kWarning, "warning");
   Log(LogLevel::kError, "error");
@@ -38,16 +37,16 @@ TEST_F(LogTest, SinkGetsItsLevelAndAbove) {
 }
 
 TEST_F(LogTest, RemovedSinkIsNotCalled) {
-  SetLogSink(&Append, &messages_, LogLevel::kDebug);
-  SetLogSink(nullptr, nullptr, LogLevel::kDebug);
+  SetLogSink(Append(), LogLevel::kDebug);
+  SetLogSink({}, LogLevel::kDebug);
   Log(LogLevel::kError, "error");
   EXPECT_TRUE(messages_.empty());
 }
 
 TEST_F(LogTest, NoLockIsHeldWhileTheSinkRuns) {
   // Would deadlock otherwise.
-  SetLogSink([](LogLevel, const char*, void* user) { SetLogSink(&Append, user, LogLevel::kDebug); },
-             &messages_, LogLevel::kDebug);
+  SetLogSink([this](LogLevel, const char*) { SetLogSink(Append(), LogLevel::kDebug); },
+             LogLevel::kDebug);
   Log(LogLevel::kInfo, "first");
   Log(LogLevel::kInfo, "second");
   EXPECT_EQ(messages_, Messages{"second"});

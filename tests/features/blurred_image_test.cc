@@ -12,7 +12,7 @@
 namespace plumb {
 namespace {
 
-using test::GrayImage;
+using testing::GrayImage;
 
 GrayImage Noise(int width, int height, uint32_t seed) {
   std::mt19937 random(seed);

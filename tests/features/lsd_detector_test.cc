@@ -13,9 +13,9 @@
 namespace plumb {
 namespace {
 
-using test::DistanceFromLine;
-using test::GrayImage;
-using test::SoftRectangle;
+using testing::DistanceFromLine;
+using testing::GrayImage;
+using testing::SoftRectangle;
 
 TEST(LsdDetector, FindsTheBordersOfARectangle) {
   for (const double angle : {0.0, 0.3, 1.0}) {

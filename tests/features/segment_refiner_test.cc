@@ -11,11 +11,11 @@
 namespace plumb {
 namespace {
 
-using test::DistanceFromLine;
-using test::GrayImage;
-using test::SoftRectangle;
+using testing::DistanceFromLine;
+using testing::GrayImage;
+using testing::SoftRectangle;
 
-class SegmentRefinerTest : public testing::Test {
+class SegmentRefinerTest : public ::testing::Test {
  protected:
   SegmentRefinerTest() : image_(200, 160) { rectangle_.Draw(&image_); }
 

@@ -15,9 +15,9 @@
 namespace plumb {
 namespace {
 
-using test::DistanceFromLine;
-using test::GrayImage;
-using test::SoftRectangle;
+using testing::DistanceFromLine;
+using testing::GrayImage;
+using testing::SoftRectangle;
 
 BlurredImage Blur(const GrayImage& image) {
   BlurredImage blurred;

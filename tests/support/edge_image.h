@@ -13,7 +13,7 @@
 #include "plumb/features/luminance.h"
 #include "plumb/geometry/segment.h"
 
-namespace plumb::test {
+namespace plumb::testing {
 
 /// 8-bit grey image to draw into, with views of it.
 struct GrayImage {
@@ -80,4 +80,4 @@ inline double DistanceFromLine(const Segment2& segment, const Segment2& line) {
   return std::max(distance(segment.start), distance(segment.end));
 }
 
-}  // namespace plumb::test
+}  // namespace plumb::testing

@@ -1,35 +1,39 @@
 #include "plumb/base/log.h"
 
+#include <memory>
 #include <mutex>
+#include <utility>
 
 namespace plumb {
 namespace {
 
 struct Target {
-  LogSink sink = nullptr;
-  void* user = nullptr;
-  LogLevel min_level = LogLevel::kWarning;
+  LogSink sink;
+  LogLevel min_level;
 };
 
 std::mutex target_mutex;
-Target target;
+std::shared_ptr<const Target> target;  // null: nobody listens
 
 }  // namespace
 
-void SetLogSink(LogSink sink, void* user, LogLevel min_level) {
-  const std::scoped_lock lock(target_mutex);
-  target = {sink, user, min_level};
+void SetLogSink(LogSink sink, LogLevel min_level) {
+  std::shared_ptr<const Target> next;
+  if (sink) next = std::make_shared<const Target>(Target{std::move(sink), min_level});
+  {
+    const std::scoped_lock lock(target_mutex);
+    std::swap(target, next);
+  }
+  // The former target ends here or with its last call, without the lock.
 }
 
 void Log(LogLevel level, const std::string& message) {
-  Target current;
+  std::shared_ptr<const Target> current;
   {
     const std::scoped_lock lock(target_mutex);
     current = target;
   }
-  if (current.sink != nullptr && level >= current.min_level) {
-    current.sink(level, message.c_str(), current.user);
-  }
+  if (current != nullptr && level >= current->min_level) current->sink(level, message.c_str());
 }
 
 }  // namespace plumb

@@ -18,7 +18,9 @@ RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options) {
   if (evidence.num_pairs < kMinPairs || !(evidence.refined.map_share >= options.min_map_support)) {
     return RefineStatus::kLowSupport;
   }
-  if (evidence.num_observed_directions < 6) return RefineStatus::kDegenerate;
+  if (options.needs_all_directions && evidence.num_observed_directions < 6) {
+    return RefineStatus::kDegenerate;
+  }
   if (!(evidence.refined.Value() >= options.min_gain * evidence.prior.Value())) {
     return RefineStatus::kKeptPrior;
   }

@@ -19,6 +19,9 @@ struct GateEvidence {
 struct GateOptions {
   double min_map_support = 0.12;
   double min_gain = 1.03;  // of the support's value over the prior's; 1.00 in a stream
+  /// The lines must determine all six directions better than the prior does. Not in a stream, whose
+  /// prediction is good to 2 cm: there the prior may hold what the lines leave open.
+  bool needs_all_directions = true;
 };
 
 /// Poses farther apart than this are clearly different.

@@ -33,6 +33,7 @@ struct FrameResult {
   uint64_t frame_index = 0;  // counts the frames that the session accepted, from 0
   int64_t timestamp_ns = 0;
   uint64_t user_tag = 0;
+  uint32_t user_kind = 0;
   FrameOutcome outcome = FrameOutcome::kFailed;
   Error error;                     // of kFailed
   bool searched = false;           // the refinement needed a search over the prior's uncertainty

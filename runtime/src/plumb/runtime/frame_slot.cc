@@ -39,6 +39,7 @@ void CopyImage(const ImageView& from, std::vector<uint8_t>* pixels, ImageView* i
 void FrameSlot::Assign(const SessionFrame& frame, int64_t now_ns) {
   ticket.timestamp_ns = frame.timestamp_ns;
   ticket.user_tag = frame.user_tag;
+  ticket.user_kind = frame.user_kind;
   ticket.prior = frame.prior;
   ticket.prior.cam_from_world.rotation.normalize();
   ticket.submitted_ns = now_ns;

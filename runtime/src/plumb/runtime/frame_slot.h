@@ -19,6 +19,7 @@ struct FrameTicket {
   uint64_t index = 0;
   int64_t timestamp_ns = 0;
   uint64_t user_tag = 0;
+  uint32_t user_kind = 0;
   PosePrior prior;
   int64_t submitted_ns = 0;  // of the session's own clock
 };

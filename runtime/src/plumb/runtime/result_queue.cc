@@ -1,9 +1,16 @@
 #include "plumb/runtime/result_queue.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
 namespace plumb {
+namespace {
+
+// A day: a longer wait would overflow the clock when it is added to the time.
+constexpr int64_t kMaxWaitNs = int64_t{24} * 3600 * 1'000'000'000;
+
+}  // namespace
 
 ResultQueue::ResultQueue(size_t capacity, bool waits_when_full)
     : waits_when_full_(waits_when_full), ring_(capacity) {}
@@ -46,7 +53,7 @@ bool ResultQueue::Poll(FrameResult* out_result) {
 bool ResultQueue::Wait(int64_t timeout_ns, FrameResult* out_result) {
   {
     std::unique_lock lock(mutex_);
-    pushed_.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
+    pushed_.wait_for(lock, std::chrono::nanoseconds(std::min(timeout_ns, kMaxWaitNs)),
                      [this] { return is_closed_ || count_ > 0; });
     if (!PopLocked(out_result)) return false;
   }

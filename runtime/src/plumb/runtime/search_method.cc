@@ -147,7 +147,8 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
           Observe(best.alignment.line_information / common_scale, PriorInformation(prior))
               .num_observed};
   attempt.status = Decide(attempt.evidence, {.min_map_support = options_.min_map_support,
-                                             .min_gain = input.search ? kSearchGain : kStreamGain});
+                                             .min_gain = input.search ? kSearchGain : kStreamGain,
+                                             .needs_all_directions = input.search});
   return attempt;
 }
 

@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "plumb/refine/uncertainty.h"
 #include "plumb/runtime/frame_queue.h"
 #include "plumb/runtime/result_queue.h"
 #include "plumb/runtime/stream_tracker.h"
@@ -18,6 +19,7 @@ namespace plumb {
 namespace {
 
 constexpr uint32_t kMaxResultCapacity = 1024;
+constexpr int64_t kMaxSubmitTimeoutNs = 1'000'000'000'000;
 
 int64_t NowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -37,14 +39,6 @@ Status Contain(Fn&& fn) {
   }
 }
 
-Matrix6d CovarianceOf(const PosePrior& prior) {
-  const double rotation = prior.rotation_sigma_rad * prior.rotation_sigma_rad / 3.0;
-  const double position = prior.position_sigma_m * prior.position_sigma_m / 3.0;
-  Vector6d diagonal;
-  diagonal << Eigen::Vector3d::Constant(rotation), Eigen::Vector3d::Constant(position);
-  return diagonal.asDiagonal();
-}
-
 }  // namespace
 
 Status SessionOptions::Validate() const {
@@ -56,7 +50,9 @@ Status SessionOptions::Validate() const {
     return invalid("result_capacity", result_capacity, "1..1024");
   }
   if (deadline_ns < 0) return invalid("deadline_ns", deadline_ns, "0..");
-  if (submit_timeout_ns < 0) return invalid("submit_timeout_ns", submit_timeout_ns, "0..");
+  if (submit_timeout_ns < 0 || submit_timeout_ns > kMaxSubmitTimeoutNs) {
+    return invalid("submit_timeout_ns", submit_timeout_ns, "0..1e12");
+  }
   if (const Status valid = refiner.Validate(); !valid) return valid;
   return stream.Validate();
 }
@@ -241,6 +237,7 @@ void Session::Impl::BeginResult(const FrameTicket& ticket) {
   result.frame_index = ticket.index;
   result.timestamp_ns = ticket.timestamp_ns;
   result.user_tag = ticket.user_tag;
+  result.user_kind = ticket.user_kind;
   result.prior = ticket.prior;
   result.error = {};
   result.searched = false;
@@ -253,7 +250,8 @@ void Session::Impl::BeginResult(const FrameTicket& ticket) {
   refined.matches = std::move(matches);
   refined.status = RefineStatus::kKeptPrior;
   refined.cam_from_world = ticket.prior.cam_from_world;
-  refined.covariance = CovarianceOf(ticket.prior);
+  refined.covariance =
+      PriorCovariance(ticket.prior.rotation_sigma_rad, ticket.prior.position_sigma_m);
   if (options.mode == SessionMode::kStream) {
     const auto predicted =
         PredictLocally(tracker.state(), options.stream, ticket.prior.cam_from_world);

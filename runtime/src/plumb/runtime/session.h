@@ -41,7 +41,7 @@ struct SessionOptions {
   /// A frame whose segments are found later than this after its submission is reported as kLate
   /// [ns]; 0: no deadline.
   int64_t deadline_ns = 0;
-  /// Longest time that Submit() waits under kBlock [ns]; 0: no limit.
+  /// Longest time that Submit() waits under kBlock [ns], up to 1e12; 0: no limit.
   int64_t submit_timeout_ns = 0;
   /// When set, gets every result, in order, on the session's thread and without a lock held;
   /// nothing is kept for Poll() and Wait(). Must not throw. May call Submit() under kNewest only.
@@ -58,7 +58,8 @@ struct SessionFrame {
   int64_t timestamp_ns = 0;  // strictly increasing within a session
   PosePrior prior;
   std::span<const PointMatch> points;  // optional
-  uint64_t user_tag = 0;               // comes back in the result
+  uint64_t user_tag = 0;               // these two come back in the result
+  uint32_t user_kind = 0;
   /// When set, the image is not copied: its planes must stay until the session has called this,
   /// once, from any thread and without a lock held; also when the frame is dropped or the session
   /// destroyed. Not called when Submit() does not accept the frame.
@@ -104,7 +105,7 @@ class Session {
   /// Takes the oldest result; its buffers are exchanged for those of `out_result`.
   /// @return false when there is none.
   bool Poll(FrameResult* out_result);
-  /// The same, waiting for at most `timeout_ns`.
+  /// The same, waiting for at most `timeout_ns`, and at most a day.
   bool Wait(int64_t timeout_ns, FrameResult* out_result);
 
   SessionStats Stats() const;

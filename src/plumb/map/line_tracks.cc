@@ -1,6 +1,7 @@
 #include "plumb/map/line_tracks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <tuple>
 
@@ -10,8 +11,8 @@ namespace plumb {
 namespace {
 
 constexpr double kMinProjectedPx = 8.0;
-constexpr double kDepthSlackM = 1.0;      // a line so far behind all segments of a frame is skipped
-constexpr double kRankPenaltyPx = 0.002;  // per place in the order of the tracks
+constexpr double kDepthSlackM = 1.0;    // a line so far behind all segments of a frame is skipped
+constexpr double kPxPerDoubling = 1.0;  // a line of twice the observations may lie so much farther
 constexpr uint32_t kNoLine = UINT32_MAX;
 
 bool NearInSpace(const Segment3& line, const LineObservation& observation, double margin_m) {
@@ -31,10 +32,10 @@ class FrameAssociator {
   FrameAssociator(const ObservationTable& table, const AssociationGate& gate)
       : table_(table), gate_(gate) {}
 
-  // Cheapest pairs first; cost = distance in the image + rank_penalty_px * line. `segment` is the
-  // index within the frame. Valid until the next call.
+  // Cheapest pairs first: distance in the image less the line's bonus (none if `bonus_px` is
+  // empty). `segment` is the index within the frame. Valid until the next call.
   std::span<const AssociationCandidate> Find(const LineCloud& lines, uint32_t frame,
-                                             double rank_penalty_px) {
+                                             std::span<const double> bonus_px) {
     const SegmentsByAngle segments(table_.SegmentsOf(frame));
     lines.Project(table_.camera(frame), table_.cam_from_world(frame), kMinProjectedPx,
                   table_.max_depth_m(frame) + kDepthSlackM, &projected_);
@@ -46,8 +47,9 @@ class FrameAssociator {
       return !NearInSpace(lines[c.line], table_[table_.frame_begin(frame) + c.segment],
                           gate_.depth_margin_m);
     });
-    const auto key = [rank_penalty_px](const AssociationCandidate& c) {
-      return std::tuple(c.distance_px + rank_penalty_px * c.line, c.line, c.segment);
+    const auto key = [bonus_px](const AssociationCandidate& c) {
+      const double bonus = bonus_px.empty() ? 0.0 : bonus_px[c.line];
+      return std::tuple(c.distance_px - bonus, c.line, c.segment);
     };
     std::sort(candidates_.begin(), candidates_.end(),
               [&key](const auto& a, const auto& b) { return key(a) < key(b); });
@@ -107,7 +109,7 @@ std::vector<LineTrack> GrowTracks(const ObservationTable& table, const Associati
     const uint32_t begin = table.frame_begin(frame);
     const std::span<const Segment2> segments = table.SegmentsOf(frame);
     std::vector<bool> used(segments.size(), false);
-    for (const AssociationCandidate& c : associator.Find(lines, frame, 0.0)) {
+    for (const AssociationCandidate& c : associator.Find(lines, frame, {})) {
       if (used[c.segment]) continue;
       used[c.segment] = true;
       members[c.line].push_back(begin + c.segment);
@@ -136,12 +138,17 @@ std::vector<LineTrack> GrowTracks(const ObservationTable& table, const Associati
 std::vector<LineTrack> SettleTracks(const ObservationTable& table, const AssociationGate& gate,
                                     std::vector<LineTrack> tracks, const TrackProgress& progress) {
   LineCloud lines;
-  for (const uint32_t i : OrderOfTracks(table, tracks)) lines.Add(tracks[i].segment_in_world);
+  std::vector<double> bonus_px;
+  for (const uint32_t i : OrderOfTracks(table, tracks)) {
+    lines.Add(tracks[i].segment_in_world);
+    const double count = static_cast<double>(tracks[i].observations.size());
+    bonus_px.push_back(kPxPerDoubling * std::log2(count));
+  }
 
   std::vector<uint32_t> owner(table.size(), kNoLine);
   FrameAssociator associator(table, gate);
   for (uint32_t frame = 0; frame < table.num_frames(); ++frame) {
-    for (const AssociationCandidate& c : associator.Find(lines, frame, kRankPenaltyPx)) {
+    for (const AssociationCandidate& c : associator.Find(lines, frame, bonus_px)) {
       uint32_t& line = owner[table.frame_begin(frame) + c.segment];
       if (line == kNoLine) line = c.line;
     }

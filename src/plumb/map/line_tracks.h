@@ -24,8 +24,9 @@ using TrackProgress = std::function<void(double done)>;  // 0..1
 std::vector<LineTrack> GrowTracks(const ObservationTable& table, const AssociationGate& gate,
                                   const TrackProgress& progress);
 
-/// Associates every segment anew with refined lines, those of many observations first. Tracks come
-/// back in that order; the ones that lost all their segments are gone.
+/// Associates every segment anew with refined lines. The nearest line in the image wins, but a line
+/// of twice as many observations may lie 1 px farther away, so that near-duplicates merge. Tracks
+/// come back by descending number of observations before; those that lost all segments are gone.
 std::vector<LineTrack> SettleTracks(const ObservationTable& table, const AssociationGate& gate,
                                     std::vector<LineTrack> tracks, const TrackProgress& progress);
 

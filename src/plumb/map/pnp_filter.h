@@ -14,7 +14,7 @@ namespace plumb {
 
 struct PnpFilterOptions {
   bool enabled = true;
-  double threshold_px = 3.0;  // reprojection error of an inlier
+  double threshold_px = 2.0;  // reprojection error of an inlier
   int iterations = 500;
   double confidence = 0.999;
   uint32_t min_inliers = 12;  // end points; fewer: nothing is known, nothing is filtered

@@ -30,6 +30,7 @@ std::optional<Segment2> ProjectSegmentInCam(const Camera& camera, const Segment3
   Eigen::Vector3d a = segment_in_cam.start;
   Eigen::Vector3d b = segment_in_cam.end;
   if (!(a.z() > kNearPlane || b.z() > kNearPlane)) return std::nullopt;
+  if (!std::isfinite((a + b).sum())) return std::nullopt;  // the clipping below would hide it
   const auto clip_to_near = [](const Eigen::Vector3d& inside, Eigen::Vector3d& outside) {
     outside = inside + (inside.z() - kNearPlane) / (inside.z() - outside.z()) * (outside - inside);
   };

@@ -34,7 +34,7 @@ inline constexpr double kNearPlane = 0.1;
 std::optional<ImageLine> ProjectLine(const Camera& camera, const Segment3& segment_in_cam);
 
 /// Projects a segment, clipped to z >= kNearPlane and to the image enlarged by `margin_px`.
-/// @return the visible part [px], or nullopt if nothing of it is visible.
+/// @return the visible part [px], or nullopt if nothing of it is visible or a number is not finite.
 std::optional<Segment2> ProjectSegment(const Camera& camera, const Rigid3& cam_from_world,
                                        const Segment3& segment_in_world, double margin_px = 0.0);
 

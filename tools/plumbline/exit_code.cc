@@ -8,6 +8,7 @@ ExitCode ExitCodeOf(ErrorCode code) {
   if (code == ErrorCode::kNotFound) return kExitNoInput;
   // Data of another version or model than this build reads; detectors map it to kExitNoDevice.
   if (code == ErrorCode::kCorruptData || code == ErrorCode::kUnsupported) return kExitBadData;
+  if (code == ErrorCode::kIoError) return kExitIo;
   if (code == ErrorCode::kDeviceLost) return kExitTryAgain;
   return kExitInternal;
 }

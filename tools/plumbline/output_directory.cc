@@ -1,6 +1,7 @@
 // Directories of results that appear complete or not at all.
 #include "tools/plumbline/output_directory.h"
 
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
@@ -41,21 +42,28 @@ OutputDirectory::~OutputDirectory() {
   if (!temporary_path_.empty()) fs::remove_all(temporary_path_, code);
 }
 
-Outcome OutputDirectory::Open(const std::string& final_path, const std::string& marker) {
-  final_path_ = WithoutTrailingSlash(final_path);
+Outcome CheckReplaceable(const std::string& path, const std::string& marker) {
+  const std::string target = WithoutTrailingSlash(path);
   std::error_code code;
-  if (fs::exists(final_path_, code)) {
+  if (fs::exists(target, code)) {
     const bool replaceable =
-        fs::is_directory(final_path_, code) &&
-        (fs::is_empty(final_path_, code) || fs::exists(final_path_ + "/" + marker, code));
+        fs::is_directory(target, code) &&
+        (fs::is_empty(target, code) || fs::exists(target + "/" + marker, code));
     if (!replaceable) {
-      return CannotCreate(final_path_, "it exists and is no earlier result (no " + marker + ")");
+      return CannotCreate(target, "it exists and is no earlier result (no " + marker + ")");
     }
   }
-  const fs::path parent = fs::path(final_path_).parent_path();
+  const fs::path parent = fs::path(target).parent_path();
   if (!parent.empty() && !fs::is_directory(parent, code)) {
-    return CannotCreate(final_path_, "there is no directory " + parent.string());
+    return CannotCreate(target, "there is no directory " + parent.string());
   }
+  return std::nullopt;
+}
+
+Outcome OutputDirectory::Open(const std::string& final_path, const std::string& marker) {
+  if (Outcome failed = CheckReplaceable(final_path, marker)) return failed;
+  final_path_ = WithoutTrailingSlash(final_path);
+  std::error_code code;
   const std::string temporary = PartialName(final_path_);
   fs::remove_all(temporary, code);
   if (!fs::create_directory(temporary, code)) return CannotCreate(final_path_, code.message());
@@ -85,23 +93,6 @@ Outcome OutputDirectory::Commit() {
   }
   temporary_path_.clear();
   if (replaces) fs::remove_all(aside, code);
-  return std::nullopt;
-}
-
-Outcome WriteFileAtomically(const std::string& path, const std::string& bytes) {
-  const std::string temporary = PartialName(path);
-  std::error_code code;
-  if (Outcome failed = WriteFile(temporary, bytes)) {
-    fs::remove(temporary, code);
-    failed->message.replace(0, temporary.size(), path);
-    return failed;
-  }
-  fs::rename(temporary, path, code);
-  if (code) {
-    const std::string reason = code.message();
-    fs::remove(temporary, code);
-    return CannotCreate(path, reason);
-  }
   return std::nullopt;
 }
 

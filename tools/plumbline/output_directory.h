@@ -7,6 +7,11 @@
 
 namespace plumb::tools {
 
+/// Checks that a directory of results could take its place at `path`: the parent exists and nothing
+/// is there but an empty directory or an earlier result, which holds a file named `marker`.
+/// @return kExitCannotCreate otherwise.
+Outcome CheckReplaceable(const std::string& path, const std::string& marker);
+
 /// Results are written into a temporary directory beside the final place; Commit() renames it. What
 /// was not committed is removed with the object, so that an error leaves nothing behind.
 class OutputDirectory {
@@ -34,8 +39,5 @@ class OutputDirectory {
   std::string final_path_;
   std::string temporary_path_;  // empty when there is nothing to remove
 };
-
-/// Writes one file through a temporary one that is renamed.
-Outcome WriteFileAtomically(const std::string& path, const std::string& bytes);
 
 }  // namespace plumb::tools

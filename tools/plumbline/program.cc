@@ -24,10 +24,17 @@ CLI::App& AddGroup(CLI::App& parent, const char* name, const char* description) 
 
 void AddCommands(CLI::App& program, PendingRun& pending) {
   AddDetect(program, pending);
+  CLI::App& map = AddGroup(program, "map", "Build, inspect and export line maps");
+  AddMapBuild(map, pending);
+  AddMapInfo(map, pending);
+  AddMapExport(map, pending);
+  AddReplay(program, pending);
   CLI::App& eval = AddGroup(program, "eval", "Score detections or refined poses");
   AddEvalLines(eval, pending);
   AddEvalTrajectory(eval, pending);
   AddSynth(program, pending);
+  CLI::App& device = AddGroup(program, "device", "Compute devices");
+  AddDeviceList(device, pending);
   AddVersion(program, pending);
 }
 

@@ -1,0 +1,196 @@
+// Runs a recorded sequence through a session: what replay and bench frame share.
+#include "tools/plumbline/frame_run.h"
+
+#include <algorithm>
+#include <numbers>
+#include <utility>
+
+#include "plumb/map/map_file.h"
+#include "tools/datasets/image_file.h"
+#include "tools/datasets/text_file.h"
+#include "tools/datasets/timestamp.h"
+#include "tools/datasets/trajectory.h"
+#include "tools/plumbline/console.h"
+
+namespace plumb::tools {
+namespace {
+
+/// A prior within it of a frame's time is that frame's.
+constexpr int64_t kSameFrameNs = 1'000'000;
+constexpr int64_t kWaitNs = 1'000'000'000;
+
+/// "CM,DEG" into the norms of the prior's uncertainty.
+Outcome ParsePriorSize(const std::string& text, PosePrior* out_prior) {
+  const std::vector<DataLine> lines = DataLines(text);
+  if (lines.size() == 1 && lines[0].fields.size() == 2) {
+    const Result<double> cm = ParseNumber(lines[0].fields[0]);
+    const Result<double> deg = ParseNumber(lines[0].fields[1]);
+    if (cm && deg && *cm > 0.0 && *deg > 0.0) {
+      out_prior->position_sigma_m = *cm / 100.0;
+      out_prior->rotation_sigma_rad = *deg * std::numbers::pi / 180.0;
+      return std::nullopt;
+    }
+  }
+  return Failure{kExitUsage, "--prior-size " + text + ": want two positive numbers, CM,DEG"};
+}
+
+Outcome ReadPriors(const FrameRunOptions& options, FrameRun* run) {
+  PosePrior prior;
+  if (Outcome failed = ParsePriorSize(options.prior_size, &prior)) return failed;
+  const Result<Trajectory> poses = ReadTumTrajectory(options.priors);
+  if (!poses) return FailureFrom(poses.error());
+  size_t num_missing = 0;
+  int64_t first_missing_ns = 0;
+  for (const SequenceFrame& frame : run->frames) {
+    const StampedPose* pose = NearestPose(*poses, frame.timestamp_ns, kSameFrameNs);
+    if (pose == nullptr) {
+      if (num_missing++ == 0) first_missing_ns = frame.timestamp_ns;
+      continue;
+    }
+    prior.cam_from_world = pose->cam_from_world;
+    run->priors.push_back(prior);
+  }
+  if (num_missing == run->frames.size()) {
+    return Failure{kExitBadData, options.priors + ": names none of the " +
+                                     std::to_string(num_missing) + " frames of " + options.frames};
+  }
+  if (num_missing > 0) {
+    return Failure{kExitBadData, options.priors + ": no pose for " + std::to_string(num_missing) +
+                                     " of the " + std::to_string(run->frames.size()) +
+                                     " frames, the first is " + FormatTimestamp(first_missing_ns)};
+  }
+  return std::nullopt;
+}
+
+Outcome FailFrame(const SequenceFrame& frame, const Error& error) {
+  // A broken frame is bad data; the command line itself has been checked before.
+  const ExitCode code =
+      error.code == ErrorCode::kInvalidArgument ? kExitBadData : ExitCodeOf(error.code);
+  return Failure{code, frame.color_path + ": " + error.message};
+}
+
+/// Hands finished results to the sink.
+class ResultPump {
+ public:
+  ResultPump(const FrameRun& run, Session* session, const FrameSink& sink)
+      : run_(run), session_(session), sink_(sink) {}
+
+  size_t num_done() const { return num_done_; }
+
+  Outcome TakeFinished() {
+    while (session_->Poll(&result_)) {
+      if (Outcome failed = Pass()) return failed;
+    }
+    return std::nullopt;
+  }
+
+  Outcome TakeAll(size_t num_submitted) {
+    while (num_done_ < num_submitted) {
+      if (!session_->Wait(kWaitNs, &result_)) continue;
+      if (Outcome failed = Pass()) return failed;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  Outcome Pass() {
+    const size_t index = num_done_++;
+    if (result_.outcome == FrameOutcome::kFailed)
+      return FailFrame(run_.frames[index], result_.error);
+    return sink_(index, result_);
+  }
+
+  const FrameRun& run_;
+  Session* session_;
+  const FrameSink& sink_;
+  FrameResult result_;
+  size_t num_done_ = 0;
+};
+
+}  // namespace
+
+void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
+  command
+      .add_option("--sequence", options.sequence, "Sequence in TUM RGB-D layout with camera.json")
+      ->required();
+  command.add_option("--frames", options.frames, "File with the timestamps of the query frames")
+      ->required();
+  command
+      .add_option("--priors", options.priors,
+                  "Coarse pose of every query frame, TUM format (camera-to-world)")
+      ->required();
+  command.add_option("--map", options.map, "Directory that `plumbline map build` wrote")
+      ->required();
+  BindDetectorOptions(command, options.detector);
+  command
+      .add_option("--prior-size", options.prior_size,
+                  "How far off the priors may be: norms in centimetres and degrees, CM,DEG")
+      ->capture_default_str();
+  command
+      .add_option("--mode", options.mode,
+                  "independent: every frame from its own prior; stream: the priors are a tracker's "
+                  "poses and the correction is carried from frame to frame")
+      ->check(CLI::IsMember({"independent", "stream"}))
+      ->capture_default_str();
+  command.add_option("--method", options.method, "search, or the paper's local method")
+      ->check(CLI::IsMember({"search", "paper"}))
+      ->capture_default_str();
+}
+
+Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
+  Result<TumSequence> sequence = ReadTumSequence(options.sequence);
+  if (!sequence) return FailureFrom(sequence.error());
+  Result<std::vector<SequenceFrame>> frames = SelectFrames(*sequence, options.frames);
+  if (!frames) return FailureFrom(frames.error());
+  if (const Status exist = CheckFilesExist(*frames, false); !exist) {
+    return FailureFrom(exist.error());
+  }
+  out_run->sequence = *std::move(sequence);
+  out_run->frames = *std::move(frames);
+  std::sort(out_run->frames.begin(), out_run->frames.end(),
+            [](const SequenceFrame& a, const SequenceFrame& b) {
+              return a.timestamp_ns < b.timestamp_ns;
+            });
+  if (Outcome failed = ReadPriors(options, out_run)) return failed;
+
+  Result<LineMap> map = ReadMap(options.map);
+  if (!map) return FailureFrom(map.error());
+  out_run->map = *std::move(map);
+  out_run->index = std::make_unique<MapIndex>(out_run->map);
+  if (Outcome failed = CreateDetector(options.detector, &out_run->detector)) return failed;
+  out_run->detector_name = out_run->detector->Name();
+  out_run->device = DeviceOf(*out_run->detector);
+  if (out_run->detector_name != out_run->map.detector) {
+    PrintRemark(options.map + ": was built with " + out_run->map.detector +
+                "'s lines, the queries use " + out_run->detector_name + "'s");
+  }
+  SessionOptions& session = out_run->session;
+  session.mode = options.mode == "stream" ? SessionMode::kStream : SessionMode::kIndependent;
+  session.policy = FramePolicy::kBlock;
+  session.refiner.method = options.method == "paper" ? RefineMethod::kPaper : RefineMethod::kSearch;
+  return std::nullopt;
+}
+
+Outcome RunFrames(FrameRun* run, const FrameSink& sink) {
+  Result<std::unique_ptr<Session>> created =
+      Session::Create(*run->index, std::move(run->detector), run->session);
+  if (!created) return FailureFrom(created.error());
+  Session& session = **created;
+  ResultPump pump(*run, &session, sink);
+  for (size_t i = 0; i < run->frames.size(); ++i) {
+    const SequenceFrame& frame = run->frames[i];
+    const Result<cv::Mat> image = ReadColorImage(frame.color_path);
+    if (!image) return FailureFrom(image.error());
+    SessionFrame input;
+    input.image = ViewOf(*image);
+    input.camera = run->sequence.camera;
+    input.timestamp_ns = frame.timestamp_ns;
+    input.prior = run->priors[i];
+    const Result<SubmitOutcome> submitted = session.Submit(input);
+    if (!submitted) return FailFrame(frame, submitted.error());
+    if (Outcome failed = pump.TakeFinished()) return failed;
+  }
+  return pump.TakeAll(run->frames.size());
+}
+
+}  // namespace plumb::tools

@@ -1,0 +1,56 @@
+// Runs a recorded sequence through a session: what replay and bench frame share.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "plumb/map/line_map.h"
+#include "plumb/map/map_index.h"
+#include "plumb/runtime/session.h"
+#include "tools/datasets/tum_sequence.h"
+#include "tools/plumbline/detector_choice.h"
+#include "tools/plumbline/exit_code.h"
+
+namespace plumb::tools {
+
+struct FrameRunOptions {
+  std::string sequence, frames, priors, map;
+  DetectorOptions detector;
+  std::string prior_size = "10,2";  // cm, deg
+  std::string mode;                 // independent | stream
+  std::string method = "search";    // search | paper
+  std::string points = "none";      // none | opencv
+};
+
+/// Declares the options; `options.mode` is the default mode.
+void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options);
+
+/// The input of a run, read and checked completely before the first frame.
+struct FrameRun {
+  TumSequence sequence;
+  std::vector<SequenceFrame> frames;  // ascending in time
+  std::vector<PosePrior> priors;      // of the same frames
+  LineMap map;
+  std::unique_ptr<MapIndex> index;  // over `map`
+  std::unique_ptr<LineDetector> detector;
+  std::string detector_name, device;  // for reports
+  SessionOptions session;
+  bool with_points = false;
+};
+
+/// Reads everything that `options` name. Every frame needs an image and a prior.
+Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run);
+
+/// Gets frame number `index` of the run with its result, in order.
+using FrameSink = std::function<Outcome(size_t index, const FrameResult& result)>;
+
+/// Takes the run's detector; a run can be done once. The next image is read and detected while one
+/// frame is refined. Stops at the first frame that fails and at the sink's first failure.
+Outcome RunFrames(FrameRun* run, const FrameSink& sink);
+
+}  // namespace plumb::tools

@@ -1,0 +1,194 @@
+// plumbline map build: a line map from posed RGB-D key frames.
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plumb/features/segment_refiner.h"
+#include "plumb/map/map_builder.h"
+#include "plumb/map/map_file.h"
+#include "tools/datasets/image_file.h"
+#include "tools/datasets/timestamp.h"
+#include "tools/datasets/tum_sequence.h"
+#include "tools/plumbline/commands.h"
+#include "tools/plumbline/console.h"
+#include "tools/plumbline/detector_choice.h"
+#include "tools/plumbline/json_report.h"
+#include "tools/plumbline/output_directory.h"
+
+namespace plumb::tools {
+namespace {
+
+struct MapBuildOptions {
+  std::string sequence, frames, out;
+  DetectorOptions detector;
+  bool json = false;
+};
+
+/// Poses and files of every key frame are checked before the work starts.
+Outcome SelectKeyFrames(const MapBuildOptions& options, TumSequence* out_sequence,
+                        std::vector<SequenceFrame>* out_frames) {
+  Result<TumSequence> sequence = ReadTumSequence(options.sequence);
+  if (!sequence) return FailureFrom(sequence.error());
+  Result<std::vector<SequenceFrame>> frames = SelectFrames(*sequence, options.frames);
+  if (!frames) return FailureFrom(frames.error());
+  for (const SequenceFrame& frame : *frames) {
+    if (!frame.cam_from_world) {
+      return Failure{kExitBadData, options.sequence + "/groundtruth.txt: no pose for frame " +
+                                       FormatTimestamp(frame.timestamp_ns)};
+    }
+  }
+  if (const Status exist = CheckFilesExist(*frames, true); !exist)
+    return FailureFrom(exist.error());
+  *out_sequence = *std::move(sequence);
+  *out_frames = *std::move(frames);
+  return std::nullopt;
+}
+
+Outcome CheckSize(const std::string& path, const cv::Mat& image, const Camera& camera) {
+  if (image.cols == camera.width_px && image.rows == camera.height_px) return std::nullopt;
+  return Failure{kExitBadData, path + ": is " + std::to_string(image.cols) + " x " +
+                                   std::to_string(image.rows) + ", camera.json says " +
+                                   std::to_string(camera.width_px) + " x " +
+                                   std::to_string(camera.height_px)};
+}
+
+DepthView ViewOfDepth(const cv::Mat& depth, double depth_scale) {
+  DepthView view;
+  view.format = DepthFormat::kUint16;
+  view.data = depth.data;
+  view.row_stride_bytes = static_cast<int64_t>(depth.step[0]);
+  view.width_px = depth.cols;
+  view.height_px = depth.rows;
+  view.metres_per_unit = 1.0 / depth_scale;
+  return view;
+}
+
+/// Detects, refines and lifts the segments of one key frame.
+class KeyFrameReader {
+ public:
+  KeyFrameReader(const TumSequence& sequence, LineDetector* detector)
+      : sequence_(sequence), detector_(detector), refiner_(SegmentRefinerOptions{}) {}
+
+  Outcome AddTo(MapBuilder* builder, const SequenceFrame& frame) {
+    const Result<cv::Mat> color = ReadColorImage(frame.color_path);
+    if (!color) return FailureFrom(color.error());
+    if (Outcome failed = CheckSize(frame.color_path, *color, sequence_.camera)) return failed;
+    const Result<cv::Mat> depth = ReadDepthImage(*frame.depth_path);
+    if (!depth) return FailureFrom(depth.error());
+    if (Outcome failed = CheckSize(*frame.depth_path, *depth, sequence_.camera)) return failed;
+
+    const ImageView view = ViewOf(*color);
+    const Result<std::vector<Segment2>> raw = detector_->Detect(view);
+    if (!raw) return FailureFrom(raw.error());
+    const std::vector<Segment2> segments = refiner_.Refine(view, *raw);
+    KeyFrameInput input;
+    input.timestamp_ns = frame.timestamp_ns;
+    input.cam_from_world = *frame.cam_from_world;
+    input.camera = sequence_.camera;
+    input.segments = segments;
+    input.depth = ViewOfDepth(*depth, sequence_.depth_scale);
+    if (const Status added = builder->AddKeyFrame(std::move(input)); !added) {
+      return Failure{kExitBadData, added.error().message};
+    }
+    return std::nullopt;
+  }
+
+ private:
+  const TumSequence& sequence_;
+  LineDetector* detector_;
+  SegmentRefiner refiner_;
+};
+
+Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, double seconds) {
+  if (!options.json) {
+    char text[200];
+    std::snprintf(text, sizeof(text),
+                  "%zu lines (%zu seen by several key frames) from %zu segments of %zu key frames, "
+                  "%.1f s\n",
+                  stats.num_lines, stats.num_multi_view_lines, stats.num_segments,
+                  stats.num_key_frames, seconds);
+    return PrintText(options.out + ": " + text);
+  }
+  Json report = NewReport("map_build");
+  report["map"] = options.out;
+  report["model"] = options.detector.model;
+  report["key_frames"] = stats.num_key_frames;
+  report["segments"] = stats.num_segments;
+  report["lifted"] = stats.num_lifted;
+  report["filtered"] = stats.num_filtered;
+  report["lines"] = stats.num_lines;
+  report["multi_view_lines"] = stats.num_multi_view_lines;
+  report["seconds"] = Rounded(seconds, 3);
+  return PrintJson(report);
+}
+
+Outcome RunMapBuild(const MapBuildOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  if (Outcome failed = CheckReplaceable(options.out, "manifest.json")) return failed;
+  TumSequence sequence;
+  std::vector<SequenceFrame> frames;
+  if (Outcome failed = SelectKeyFrames(options, &sequence, &frames)) return failed;
+  std::unique_ptr<LineDetector> detector;
+  if (Outcome failed = CreateDetector(options.detector, &detector)) return failed;
+
+  MapBuilderOptions builder_options;
+  builder_options.detector = detector->Name();
+  MapBuilder builder(builder_options);
+  {
+    KeyFrameReader reader(sequence, detector.get());
+    ProgressBar progress("key frames", frames.size());
+    for (const SequenceFrame& frame : frames) {
+      if (Outcome failed = reader.AddTo(&builder, frame)) return failed;
+      progress.Advance();
+    }
+  }
+  Result<LineMap> map = [&] {
+    ProgressBar progress("fuse lines", 100);
+    size_t percent = 0;
+    return builder.Build([&](double done) {
+      for (; static_cast<double>(percent) < 100.0 * done; ++percent) progress.Advance();
+    });
+  }();
+  if (!map) return FailureFrom(map.error());
+  WriteMapOptions write_options;
+  write_options.overwrite = true;
+  if (const Status written = WriteMap(*map, options.out, write_options); !written) {
+    const bool io = written.error().code == ErrorCode::kIoError;
+    return Failure{io ? kExitIo : kExitCannotCreate, written.error().message};
+  }
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  return Report(options, builder.stats(), seconds.count());
+}
+
+}  // namespace
+
+void AddMapBuild(CLI::App& map, PendingRun& pending) {
+  AddCommand<MapBuildOptions>(
+      map, pending, "build", "Build a line map from posed RGB-D key frames",
+      [](CLI::App& command, MapBuildOptions& options) {
+        command
+            .add_option("--sequence", options.sequence,
+                        "Sequence in TUM RGB-D layout with camera.json")
+            ->required();
+        command
+            .add_option("--frames", options.frames, "File with the timestamps of the key frames")
+            ->required();
+        BindDetectorOptions(command, options.detector);
+        command
+            .add_option("--out", options.out,
+                        "Directory for the map; an earlier map there is replaced")
+            ->required();
+        command.add_flag("--json", options.json, "Print what was built as JSON");
+        command.footer(
+            "Examples:\n"
+            "  plumbline map build --sequence office --frames office/map.txt --model nano --out "
+            "office.map\n"
+            "  plumbline map info office.map");
+      },
+      RunMapBuild);
+}
+
+}  // namespace plumb::tools

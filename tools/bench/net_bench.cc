@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
-#include <ctime>
 #include <string>
 
 #include "plumb/gpu/device.h"
@@ -19,8 +17,6 @@ int Fail(const plumb::Error& error) {
   std::fprintf(stderr, "net_bench: %s\n", error.message.c_str());
   return 1;
 }
-
-double CpuMilliseconds() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 }  // namespace
 
@@ -41,10 +37,10 @@ int main(int argc, char** argv) {
   if (!model) return Fail(model.error());
   auto device = plumb::gpu::Device::Create({});
   if (!device) return Fail(device.error());
-  const double cpu_before = CpuMilliseconds();
   auto result = plumb::nn::BenchNetwork(*device, *model, options);
   if (!result) return Fail(result.error());
-  const double cpu = CpuMilliseconds() - cpu_before;
+  std::vector<double> cpu = result->frame_cpu_ms;
+  std::sort(cpu.begin(), cpu.end());
 
   std::vector<double> sorted = result->frame_ms;
   std::sort(sorted.begin(), sorted.end());
@@ -54,8 +50,10 @@ int main(int argc, char** argv) {
               info.input_width, info.input_height, info.gmac, info.num_dispatches,
               static_cast<double>(info.activation_bytes) * 1e-6);
   std::printf(
-      "create %.0f ms, first frame %.0f ms, best %.2f ms, median %.2f ms, cpu in all %.0f ms\n",
-      result->create_ms, result->first_frame_ms, sorted.front(), sorted[sorted.size() / 2], cpu);
+      "create %.0f ms, first frame %.0f ms, best %.2f ms, median %.2f ms, cpu best %.2f ms, median "
+      "%.2f ms\n",
+      result->create_ms, result->first_frame_ms, sorted.front(), sorted[sorted.size() / 2],
+      cpu.front(), cpu[cpu.size() / 2]);
   for (const auto& layer : result->layers) {
     std::printf("%10.1f us  %s\n", static_cast<double>(layer.duration_ns) * 1e-3,
                 layer.name.c_str());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <ctime>
 #include <span>
 
 #include "plumb/gpu/buffer.h"
@@ -82,10 +83,14 @@ Result<NetworkBenchResult> BenchNetwork(const std::shared_ptr<gpu::Device>& devi
   if (!list) return list.error();
   for (int frame = -1 - options.num_warm_up; frame < options.num_frames; ++frame) {
     start = Clock::now();
+    const std::clock_t cpu_start = std::clock();
     if (const Status status = (*list)->Run(kTimeout); !status) return status.error();
     const double ms = MillisecondsSince(start);
     if (frame == -1 - options.num_warm_up) result.first_frame_ms = ms;
-    if (frame >= 0) result.frame_ms.push_back(ms);
+    if (frame < 0) continue;
+    result.frame_ms.push_back(ms);
+    result.frame_cpu_ms.push_back(1e3 * static_cast<double>(std::clock() - cpu_start) /
+                                  CLOCKS_PER_SEC);
   }
   if (options.times_layers) {
     auto layers = TimeLayers(device, **network, options.num_frames);

@@ -58,11 +58,11 @@ layout(push_constant, scalar) uniform Push { int height; int width; } p;
 #endif
 
 #if SHAPE == 0
-const uint kTaps = 1u, kSpan = 8u;
+const uint kTaps = 1u, kSpan = 2u;
 #elif SHAPE == 1
-const uint kTaps = 9u, kSpan = 30u;  // three rows of 10
+const uint kTaps = 9u, kSpan = 18u;  // rows -1, 0, 1
 #else
-const uint kTaps = 17u, kSpan = 66u;  // row 0: 14; rows -1, 1: 10 each; rows -3, -2, 2, 3: 8 each
+const uint kTaps = 17u, kSpan = 34u;  // rows -1, 0, 1, then -3, -2, 2, 3 without neighbours
 #endif
 const uint kK = kIn + kExtra;
 const uint kRow = (kTaps * kK + 1u + 31u) / 32u * 32u;
@@ -96,51 +96,54 @@ float Weight(vec4 w, uint n) {
 #endif
 }
 
-// Columns -reach .. 7 + reach of row `dy` of every channel, to `start` of its span.
-#define LOAD_ROW(dy, start, reach)                                           \
-  {                                                                          \
-    const int left = BlockTexel(row + dy, column - 1, blocks);                      \
-    const int middle = BlockTexel(row + dy, column, blocks);                       \
-    const int right = BlockTexel(row + dy, column + 1, blocks);                     \
-    [[unroll]] for (uint k = 0u; k < kK; ++k) {                              \
-      const uint at = kSpan * k + start;                                     \
-      const vec4 a = texelFetch(in_texels, left + int(2u * k + 1u));         \
-      const vec4 b = texelFetch(in_texels, middle + int(2u * k));            \
-      const vec4 c = texelFetch(in_texels, middle + int(2u * k + 1u));       \
-      const vec4 d = texelFetch(in_texels, right + int(2u * k));             \
-      [[unroll]] for (uint j = 0u; j < reach; ++j) {                         \
-        x[at + j] = a[4u - reach + j];                                       \
-        x[at + reach + 8u + j] = d[j];                                       \
-      }                                                                      \
-      [[unroll]] for (uint j = 0u; j < 4u; ++j) {                            \
-        x[at + reach + j] = b[j];                                            \
-        x[at + reach + 4u + j] = c[j];                                       \
-      }                                                                      \
-    }                                                                        \
-  }
+// x holds windows of 8 pixels at every tap, two vectors each, so that no pixel is addressed alone: few
+// variables keep the driver's compiler fast, and a pixel in several windows is one register after it.
+#define SET(at, first, second) \
+  x[at] = first;               \
+  x[(at) + 1u] = second;
 
-// The block's own 8 columns of row `dy`.
-#define LOAD_BLOCK(dy, start)                                          \
+// Row `dy` of every channel with `reach` columns on both sides: 2 * reach + 1 windows from `start` on.
+#define LOAD_ROW(dy, start, reach)                                     \
   {                                                                    \
-    const int middle = BlockTexel(row + dy, column, blocks);                 \
+    const int left = BlockTexel(row + dy, column - 1, blocks);         \
+    const int middle = BlockTexel(row + dy, column, blocks);           \
+    const int right = BlockTexel(row + dy, column + 1, blocks);        \
     [[unroll]] for (uint k = 0u; k < kK; ++k) {                        \
       const uint at = kSpan * k + start;                               \
+      const vec4 a = texelFetch(in_texels, left + int(2u * k + 1u));   \
       const vec4 b = texelFetch(in_texels, middle + int(2u * k));      \
       const vec4 c = texelFetch(in_texels, middle + int(2u * k + 1u)); \
-      [[unroll]] for (uint j = 0u; j < 4u; ++j) {                      \
-        x[at + j] = b[j];                                              \
-        x[at + 4u + j] = c[j];                                         \
+      const vec4 d = texelFetch(in_texels, right + int(2u * k));       \
+      if (reach == 3u) {                                               \
+        SET(at, vec4(a.yzw, b.x), vec4(b.yzw, c.x))                    \
+        SET(at + 2u, vec4(a.zw, b.xy), vec4(b.zw, c.xy))               \
+        SET(at + 10u, vec4(b.zw, c.xy), vec4(c.zw, d.xy))              \
+        SET(at + 12u, vec4(b.w, c.xyz), vec4(c.w, d.xyz))              \
       }                                                                \
+      SET(at + 2u * reach - 2u, vec4(a.w, b.xyz), vec4(b.w, c.xyz))    \
+      SET(at + 2u * reach, b, c)                                       \
+      SET(at + 2u * reach + 2u, vec4(b.yzw, c.x), vec4(c.yzw, d.x))    \
     }                                                                  \
   }
 
-// Adds tap t of channel k, whose input for the block's first pixel lies at `base` of the span.
-#define TAP(t, base)                                                                             \
-  {                                                                                              \
-    const uint n = k * kTaps + t;                                                                \
-    if (n % 32u == 0u) w = FetchWeights(weight_row, n, lane);                                    \
-    const float value = Weight(w, n);                                                            \
-    [[unroll]] for (uint j = 0u; j < 8u; ++j) acc[j] = fma(value, x[kSpan * k + base + j], acc[j]); \
+// The block's own 8 columns of row `dy`.
+#define LOAD_BLOCK(dy, start)                                             \
+  {                                                                       \
+    const int middle = BlockTexel(row + dy, column, blocks);              \
+    [[unroll]] for (uint k = 0u; k < kK; ++k) {                           \
+      SET(kSpan * k + start, texelFetch(in_texels, middle + int(2u * k)), \
+          texelFetch(in_texels, middle + int(2u * k + 1u)))               \
+    }                                                                     \
+  }
+
+// Adds tap t of channel k, whose window lies at `base` of the channel's span.
+#define TAP(t, base)                                          \
+  {                                                           \
+    const uint n = k * kTaps + t;                             \
+    if (n % 32u == 0u) w = FetchWeights(weight_row, n, lane); \
+    const vec4 value = vec4(Weight(w, n));                    \
+    a = fma(value, x[kSpan * k + base], a);                   \
+    b = fma(value, x[kSpan * k + base + 1u], b);              \
   }
 
 void main() {
@@ -149,16 +152,12 @@ void main() {
   const int blocks = (p.width + 7) / 8;
   const int row = int(block) / blocks, column = int(block) % blocks;
 
-  float x[kK * kSpan];
+  vec4 x[kK * kSpan];
 #if SHAPE == 0
   const int own = int(2u * (block * kInTotal + kInFirst));
   [[unroll]] for (uint k = 0u; k < kIn; ++k) {
-    const vec4 a = texelFetch(in_texels, own + int(2u * k));
-    const vec4 b = texelFetch(in_texels, own + int(2u * k + 1u));
-    [[unroll]] for (uint j = 0u; j < 4u; ++j) {
-      x[8u * k + j] = a[j];
-      x[8u * k + 4u + j] = b[j];
-    }
+    SET(2u * k, texelFetch(in_texels, own + int(2u * k)),
+        texelFetch(in_texels, own + int(2u * k + 1u)))
   }
   if (kPrologue) {
     const uint scales = kOut * kRow / 4u, shifts = scales + (kIn + 31u) / 32u * 8u;
@@ -168,35 +167,30 @@ void main() {
         scale = texelFetch(weights, int(scales + k / 4u + lane));
         shift = texelFetch(weights, int(shifts + k / 4u + lane));
       }
-      const float s = subgroupShuffle(scale[k % 4u], k % 32u / 4u);
-      const float t = subgroupShuffle(shift[k % 4u], k % 32u / 4u);
-      [[unroll]] for (uint j = 0u; j < 8u; ++j) {
-        x[8u * k + j] = max(fma(s, x[8u * k + j], t), 0.0);
-      }
+      const vec4 s = vec4(subgroupShuffle(scale[k % 4u], k % 32u / 4u));
+      const vec4 t = vec4(subgroupShuffle(shift[k % 4u], k % 32u / 4u));
+      x[2u * k] = max(fma(s, x[2u * k], t), vec4(0.0));
+      x[2u * k + 1u] = max(fma(s, x[2u * k + 1u], t), vec4(0.0));
     }
   }
   const int own_extra = int(2u * (block * kExtraTotal + kExtraFirst));
   [[unroll]] for (uint k = 0u; k < kExtra; ++k) {
-    const vec4 a = texelFetch(extra_texels, own_extra + int(2u * k));
-    const vec4 b = texelFetch(extra_texels, own_extra + int(2u * k + 1u));
-    [[unroll]] for (uint j = 0u; j < 4u; ++j) {
-      x[8u * (kIn + k) + j] = a[j];
-      x[8u * (kIn + k) + 4u + j] = b[j];
-    }
+    SET(2u * (kIn + k), texelFetch(extra_texels, own_extra + int(2u * k)),
+        texelFetch(extra_texels, own_extra + int(2u * k + 1u)))
   }
 #else
 #if SHAPE == 1
   LOAD_ROW(-1, 0u, 1u)
-  LOAD_ROW(0, 10u, 1u)
-  LOAD_ROW(1, 20u, 1u)
+  LOAD_ROW(0, 6u, 1u)
+  LOAD_ROW(1, 12u, 1u)
 #else
-  LOAD_ROW(0, 0u, 3u)
-  LOAD_ROW(-1, 14u, 1u)
-  LOAD_ROW(1, 24u, 1u)
-  LOAD_BLOCK(-3, 34u)
-  LOAD_BLOCK(-2, 42u)
-  LOAD_BLOCK(2, 50u)
-  LOAD_BLOCK(3, 58u)
+  LOAD_ROW(-1, 0u, 1u)
+  LOAD_ROW(0, 6u, 3u)
+  LOAD_ROW(1, 20u, 1u)
+  LOAD_BLOCK(-3, 26u)
+  LOAD_BLOCK(-2, 28u)
+  LOAD_BLOCK(2, 30u)
+  LOAD_BLOCK(3, 32u)
 #endif
 #endif
 
@@ -212,54 +206,50 @@ void main() {
   int low = 2 * ((row / 2 * low_blocks + column / 2) * int(kOut) + int(first)) + column % 2;
   const int valid = p.width - 8 * column;
   [[dont_unroll]] for (uint o = 0u; o < count; ++o) {
-    float acc[8];
-    [[unroll]] for (uint j = 0u; j < 8u; ++j) acc[j] = 0.0;
+    vec4 a = vec4(0.0), b = vec4(0.0);
     if (kAdd == 2u) {
-      const vec4 a = texelFetch(add_texels, add), b = texelFetch(add_texels, add + 1);
-      [[unroll]] for (uint j = 0u; j < 4u; ++j) {
-        acc[j] = a[j];
-        acc[4u + j] = b[j];
-      }
+      a = texelFetch(add_texels, add);
+      b = texelFetch(add_texels, add + 1);
     }
     vec4 w;
     [[unroll]] for (uint k = 0u; k < kK; ++k) {
 #if SHAPE == 0
       TAP(0u, 0u)
 #elif SHAPE == 1
-      TAP(0u, 0u) TAP(1u, 1u) TAP(2u, 2u)
-      TAP(3u, 10u) TAP(4u, 11u) TAP(5u, 12u)
-      TAP(6u, 20u) TAP(7u, 21u) TAP(8u, 22u)
+      TAP(0u, 0u) TAP(1u, 2u) TAP(2u, 4u)
+      TAP(3u, 6u) TAP(4u, 8u) TAP(5u, 10u)
+      TAP(6u, 12u) TAP(7u, 14u) TAP(8u, 16u)
 #else
-      TAP(0u, 14u) TAP(1u, 15u) TAP(2u, 16u)
-      TAP(3u, 2u) TAP(4u, 3u) TAP(5u, 4u)
-      TAP(6u, 24u) TAP(7u, 25u) TAP(8u, 26u)
-      TAP(9u, 34u) TAP(10u, 42u) TAP(11u, 50u) TAP(12u, 58u)
-      TAP(13u, 0u) TAP(14u, 1u) TAP(15u, 5u) TAP(16u, 6u)
+      TAP(0u, 0u) TAP(1u, 2u) TAP(2u, 4u)
+      TAP(3u, 10u) TAP(4u, 12u) TAP(5u, 14u)
+      TAP(6u, 20u) TAP(7u, 22u) TAP(8u, 24u)
+      TAP(9u, 26u) TAP(10u, 28u) TAP(11u, 30u) TAP(12u, 32u)
+      TAP(13u, 6u) TAP(14u, 8u) TAP(15u, 16u) TAP(16u, 18u)
 #endif
     }
     if (kK * kTaps % 32u == 0u) w = FetchWeights(weight_row, kK * kTaps, lane);
-    const float bias = Weight(w, kK * kTaps);
-    [[unroll]] for (uint j = 0u; j < 8u; ++j) {
-      acc[j] += bias;
-      if (kRelu) acc[j] = max(acc[j], 0.0);
+    const vec4 bias = vec4(Weight(w, kK * kTaps));
+    a += bias;
+    b += bias;
+    if (kRelu) {
+      a = max(a, vec4(0.0));
+      b = max(b, vec4(0.0));
     }
     if (kAdd == 1u) {
-      const vec4 a = texelFetch(add_texels, add), b = texelFetch(add_texels, add + 1);
-      [[unroll]] for (uint j = 0u; j < 4u; ++j) {
-        acc[j] += a[j];
-        acc[4u + j] += b[j];
-      }
+      a += texelFetch(add_texels, add);
+      b += texelFetch(add_texels, add + 1);
     }
     if (kUpsampled) {
-      const vec4 a = texelFetch(low_texels, low);
-      [[unroll]] for (uint j = 0u; j < 8u; ++j) acc[j] += a[j / 2u];
+      const vec4 c = texelFetch(low_texels, low);
+      a += c.xxyy;
+      b += c.zzww;
     }
     // The padding stays zero.
-    [[unroll]] for (int j = 0; j < 8; ++j) acc[j] = j < valid ? acc[j] : 0.0;
-    out_data[target] = dvec4(packDouble2x32(floatBitsToUint(vec2(acc[0], acc[1]))),
-                             packDouble2x32(floatBitsToUint(vec2(acc[2], acc[3]))),
-                             packDouble2x32(floatBitsToUint(vec2(acc[4], acc[5]))),
-                             packDouble2x32(floatBitsToUint(vec2(acc[6], acc[7]))));
+    a = mix(vec4(0.0), a, lessThan(ivec4(0, 1, 2, 3), ivec4(valid)));
+    b = mix(vec4(0.0), b, lessThan(ivec4(4, 5, 6, 7), ivec4(valid)));
+    out_data[target] =
+        dvec4(packDouble2x32(floatBitsToUint(a.xy)), packDouble2x32(floatBitsToUint(a.zw)),
+              packDouble2x32(floatBitsToUint(b.xy)), packDouble2x32(floatBitsToUint(b.zw)));
     weight_row += kRow;
     target += kPlanarOut ? plane : 1u;
     add += 2;

@@ -37,18 +37,14 @@ Result<std::vector<gpu::StageTime>> TimeLayers(const std::shared_ptr<gpu::Device
                                                const Network& network, int num_frames) {
   auto list = RecordFrame(device, network, true);
   if (!list) return list.error();
-  std::vector<std::vector<int64_t>> samples;
   std::vector<gpu::StageTime> layers;
   for (int frame = 0; frame < num_frames; ++frame) {
     if (const Status status = (*list)->Run(kTimeout); !status) return status.error();
-    layers = (*list)->StageTimes();
-    samples.resize(layers.size());
-    for (size_t i = 0; i < layers.size(); ++i) samples[i].push_back(layers[i].duration_ns);
-  }
-  for (size_t i = 0; i < layers.size(); ++i) {
-    auto middle = samples[i].begin() + static_cast<std::ptrdiff_t>(samples[i].size() / 2);
-    std::nth_element(samples[i].begin(), middle, samples[i].end());
-    layers[i].duration_ns = *middle;
+    const std::vector<gpu::StageTime>& times = (*list)->StageTimes();
+    if (layers.empty()) layers = times;
+    for (size_t i = 0; i < layers.size(); ++i) {
+      layers[i].duration_ns = std::min(layers[i].duration_ns, times[i].duration_ns);
+    }
   }
   return layers;
 }

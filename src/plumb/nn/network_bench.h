@@ -24,7 +24,7 @@ struct NetworkBenchResult {
   double first_frame_ms = 0;           ///< With the driver's compilation.
   std::vector<double> frame_ms;        ///< Submit to done, wall clock, in order.
   std::vector<double> frame_cpu_ms;    ///< CPU time of the whole process in the same intervals.
-  std::vector<gpu::StageTime> layers;  ///< Medians per dispatch; empty unless times_layers.
+  std::vector<gpu::StageTime> layers;  ///< Shortest time of each dispatch, if times_layers.
 };
 
 /// Runs the network on a fixed random image.

@@ -58,6 +58,8 @@ class VlseDetector : public LineDetector {
   /// to the image.
   Result<std::vector<Segment2>> Collect() override;
 
+  bool WorksInBackground() const override { return true; }
+
   /// The model's preset.
   std::string Name() const override { return name_; }
 

@@ -1,0 +1,16 @@
+# cmake -DNM=... -DLIBRARY=... -P check_exports.cmake: the library exports plumb_* and nothing else.
+cmake_minimum_required(VERSION 3.25)
+execute_process(COMMAND ${NM} -D --defined-only --format=posix ${LIBRARY}
+  OUTPUT_VARIABLE symbols COMMAND_ERROR_IS_FATAL ANY)
+string(REGEX MATCHALL "[^\n]+" lines "${symbols}")
+set(count 0)
+foreach(line ${lines})
+  string(REGEX MATCH "^[^ ]+" name "${line}")
+  if(NOT name MATCHES "^plumb_[a-z_]+$")
+    message(SEND_ERROR "${name} is exported")
+  endif()
+  math(EXPR count "${count} + 1")
+endforeach()
+if(count LESS 14)
+  message(SEND_ERROR "only ${count} symbols are exported")
+endif()

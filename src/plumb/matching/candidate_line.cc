@@ -1,12 +1,11 @@
 #include "plumb/matching/candidate_line.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include <Eigen/Geometry>
 
 #include "plumb/geometry/line_projection.h"
+#include "plumb/matching/undirected_angle.h"
 
 namespace plumb {
 
@@ -40,15 +39,13 @@ void ProjectCandidates(const Camera& camera, const Rigid3& cam_from_world,
     const Eigen::Vector2d delta = image->Delta();
     const double length = delta.norm();
     if (!(length > min_length_px)) continue;
-    double angle = std::atan2(delta.y(), delta.x());
-    if (angle < 0.0) angle += std::numbers::pi;
     out->line.push_back(static_cast<uint32_t>(i));
     out->x.push_back(static_cast<float>(image->start.x()));
     out->y.push_back(static_cast<float>(image->start.y()));
     out->direction_x.push_back(static_cast<float>(delta.x() / length));
     out->direction_y.push_back(static_cast<float>(delta.y() / length));
     out->length.push_back(static_cast<float>(length));
-    out->angle.push_back(static_cast<float>(angle));
+    out->angle.push_back(UndirectedAngle(delta));
     out->weight.push_back(static_cast<float>(lines[i].weight));
   }
 }

@@ -4,18 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "plumb/matching/undirected_angle.h"
+
 namespace plumb {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-
-float UndirectedAngle(const Segment2& segment) {
-  const Eigen::Vector2d delta = segment.Delta();
-  double angle = std::atan2(delta.y(), delta.x());
-  if (angle < 0.0) angle += std::numbers::pi;
-  const float rounded = static_cast<float>(angle);
-  return rounded < kPi ? rounded : 0.0f;
-}
 
 }  // namespace
 
@@ -29,7 +23,7 @@ void SegmentTable::Assign(std::span<const Segment2> segments) {
     if (segments[i].Length() > 1e-6) source.push_back(i);
   }
   angle.resize(segments.size());
-  for (const uint32_t i : source) angle[i] = UndirectedAngle(segments[i]);
+  for (const uint32_t i : source) angle[i] = UndirectedAngle(segments[i].Delta());
   std::sort(source.begin(), source.end(), [&](uint32_t a, uint32_t b) {
     return angle[a] != angle[b] ? angle[a] < angle[b] : a < b;
   });
@@ -45,7 +39,7 @@ void SegmentTable::Assign(std::span<const Segment2> segments) {
     direction_x.push_back(static_cast<float>(direction.x()));
     direction_y.push_back(static_cast<float>(direction.y()));
     length.push_back(static_cast<float>(pixels));
-    angle.push_back(UndirectedAngle(segment));
+    angle.push_back(UndirectedAngle(segment.Delta()));
   }
 }
 

@@ -2,7 +2,6 @@
 
 #include <dlfcn.h>
 
-#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <span>
@@ -18,9 +17,6 @@
 
 namespace plumb::abi {
 namespace {
-
-// A device that hangs must not hold the session's end for long.
-constexpr std::chrono::seconds kDetectorTimeout{5};
 
 // Where the weights of the built-in networks lie: beside the installed library, or in the source
 // tree around the build tree.
@@ -107,7 +103,6 @@ Result<std::unique_ptr<LineDetector>> CreateDetector(const plumb_session_options
   Log((*device)->Info().IsSoftware() ? LogLevel::kWarning : LogLevel::kInfo,
       "device: " + gpu::Describe((*device)->Info()));
   vlse.device = *std::move(device);
-  vlse.timeout = kDetectorTimeout;
   if (options.model_data == nullptr) return CreateLineDetector(model, vlse, ModelFolders());
   vlse.model_data = std::span(static_cast<const std::byte*>(options.model_data),
                               static_cast<size_t>(options.model_size_bytes));

@@ -73,8 +73,11 @@ struct SegmentRefiner::Impl {
     for (const Segment2& segment : segments) {
       if (IsUsable(segment) && IsLongEnough(segment)) candidates.push_back(segment);
     }
-    std::stable_sort(candidates.begin(), candidates.end(),
-                     [](const Segment2& a, const Segment2& b) { return a.score > b.score; });
+    const auto is_better = [](const Segment2& a, const Segment2& b) { return a.score > b.score; };
+    // Detectors sort already; stable_sort allocates.
+    if (!std::is_sorted(candidates.begin(), candidates.end(), is_better)) {
+      std::stable_sort(candidates.begin(), candidates.end(), is_better);
+    }
     size_t count = 0;
     while (count < candidates.size() && candidates[count].score >= options.min_score) ++count;
     count = std::max<size_t>(count, options.min_count);

@@ -21,20 +21,13 @@ struct View {
   int32_t width;
 };
 
-struct Columns {
-  const float* __restrict x;
-  const float* __restrict y;
-  const float* __restrict z;
-  const float* __restrict dx;
-  const float* __restrict dy;
-  const float* __restrict dz;
-  const float* __restrict weight;
-};
-
-PLUMB_SIMD_CLONES void LookUpKernel(const View& v, const Columns& in, size_t count,
-                                    int32_t* __restrict index, float* __restrict weight,
-                                    float* __restrict out_x, float* __restrict out_y,
-                                    float* __restrict inverse_depth) {
+PLUMB_SIMD_CLONES void LookUpKernel(const View v, size_t count, const float* __restrict in_x,
+                                    const float* __restrict in_y, const float* __restrict in_z,
+                                    const float* __restrict in_dx, const float* __restrict in_dy,
+                                    const float* __restrict in_dz,
+                                    const float* __restrict in_weight, int32_t* __restrict index,
+                                    float* __restrict weight, float* __restrict out_x,
+                                    float* __restrict out_y, float* __restrict inverse_depth) {
   const float r0 = v.r[0], r1 = v.r[1], r2 = v.r[2], r3 = v.r[3], r4 = v.r[4], r5 = v.r[5];
   const float r6 = v.r[6], r7 = v.r[7], r8 = v.r[8], t0 = v.t[0], t1 = v.t[1], t2 = v.t[2];
   const float fx = v.fx, fy = v.fy, cell_fx = v.cell_fx, cell_fy = v.cell_fy;
@@ -42,12 +35,12 @@ PLUMB_SIMD_CLONES void LookUpKernel(const View& v, const Columns& in, size_t cou
   const float last_column = v.last_column, last_row = v.last_row;
   const int32_t width = v.width;
   for (size_t k = 0; k < count; ++k) {
-    const float px = in.x[k], py = in.y[k], pz = in.z[k];
+    const float px = in_x[k], py = in_y[k], pz = in_z[k];
     const float depth = r6 * px + r7 * py + r8 * pz + t2;
     const float inverse = 1.0f / std::max(depth, kMinDepth);
     const float x = (r0 * px + r1 * py + r2 * pz + t0) * inverse;
     const float y = (r3 * px + r4 * py + r5 * pz + t1) * inverse;
-    const float dx = in.dx[k], dy = in.dy[k], dz = in.dz[k];
+    const float dx = in_dx[k], dy = in_dy[k], dz = in_dz[k];
     const float turned_z = r6 * dx + r7 * dy + r8 * dz;
     float u = fx * (r0 * dx + r1 * dy + r2 * dz - x * turned_z);
     float w = fy * (r3 * dx + r4 * dy + r5 * dz - y * turned_z);
@@ -68,7 +61,7 @@ PLUMB_SIMD_CLONES void LookUpKernel(const View& v, const Columns& in, size_t cou
     const int32_t c = static_cast<int32_t>(inside ? column : 1.0f);
     const int32_t r = static_cast<int32_t>(inside ? row : 1.0f);
     index[k] = (r * width + c) * DirectionField::kChannels + channel;
-    weight[k] = inside ? in.weight[k] : 0.0f;
+    weight[k] = inside ? in_weight[k] : 0.0f;
     out_x[k] = x;
     out_y[k] = y;
     inverse_depth[k] = inverse;
@@ -103,10 +96,9 @@ void LookUp(const Camera& camera, const DirectionField& field, const RelativePos
   view.last_column = static_cast<float>(field.width() - 1);
   view.last_row = static_cast<float>(field.height() - 1);
   view.width = field.width();
-  LookUpKernel(view,
-               {samples.x.data(), samples.y.data(), samples.z.data(), samples.direction_x.data(),
-                samples.direction_y.data(), samples.direction_z.data(), samples.weight.data()},
-               samples.padded_size(), out->index.data(), out->weight.data(), out->x.data(),
+  LookUpKernel(view, samples.padded_size(), samples.x.data(), samples.y.data(), samples.z.data(),
+               samples.direction_x.data(), samples.direction_y.data(), samples.direction_z.data(),
+               samples.weight.data(), out->index.data(), out->weight.data(), out->x.data(),
                out->y.data(), out->inverse_depth.data());
 }
 

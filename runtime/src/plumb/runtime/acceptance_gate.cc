@@ -1,16 +1,39 @@
 #include "plumb/runtime/acceptance_gate.h"
 
+#include <algorithm>
+
+#include "plumb/refine/uncertainty.h"
+
 namespace plumb {
 namespace {
 
 constexpr size_t kMinPairs = 10;
 constexpr double kMaxRunnerUpRatio = 0.97;
+constexpr double kMaxDeviations = 3.0;
+constexpr double kTightPositionM = 0.10, kTightRotationRad = 0.035;
+constexpr double kMinGain = 4.0;
 
 }  // namespace
 
 bool IsClearlyDifferent(const Rigid3& a_from_world, const Rigid3& b_from_world) {
   const PoseDistance distance = DistanceBetween(a_from_world, b_from_world);
   return distance.position_m > kDifferentPositionM || distance.rotation_rad > kDifferentRotationRad;
+}
+
+bool IsPlausible(const Rigid3& cam_from_world, const PosePrior& prior) {
+  const PoseDistance distance = DistanceBetween(cam_from_world, prior.cam_from_world);
+  return distance.position_m < kMaxDeviations * prior.position_sigma_m &&
+         distance.rotation_rad < kMaxDeviations * prior.rotation_sigma_rad;
+}
+
+int CountObservedDirections(const Matrix6d& information, const PosePrior& prior) {
+  const Matrix6d prior_information =
+      PriorCovariance(std::max(prior.rotation_sigma_rad, kTightRotationRad),
+                      std::max(prior.position_sigma_m, kTightPositionM))
+          .diagonal()
+          .cwiseInverse()
+          .asDiagonal();
+  return Observe(information / kMinGain, prior_information).num_observed;
 }
 
 RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options) {
@@ -24,7 +47,9 @@ RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options) {
   if (!(evidence.refined.Value() >= options.min_gain * evidence.prior.Value())) {
     return RefineStatus::kKeptPrior;
   }
-  if (evidence.runner_up_ratio > kMaxRunnerUpRatio) return RefineStatus::kAmbiguous;
+  if (evidence.runner_up_ratio > kMaxRunnerUpRatio || !evidence.is_near_prior) {
+    return RefineStatus::kAmbiguous;
+  }
   return RefineStatus::kRefined;
 }
 

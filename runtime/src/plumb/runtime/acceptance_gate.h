@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "plumb/geometry/rigid3.h"
 #include "plumb/matching/support.h"
 #include "plumb/runtime/pose_refiner.h"
 
@@ -12,6 +13,7 @@ namespace plumb {
 struct GateEvidence {
   PoseSupport refined, prior;
   double runner_up_ratio = 0.0;     // value of the best clearly different pose over the refined's
+  bool is_near_prior = true;        // IsPlausible()
   size_t num_pairs = 0;             // line-segment pairs that hold the refined pose
   int num_observed_directions = 0;  // of 6
 };
@@ -27,6 +29,18 @@ struct GateOptions {
 /// Poses farther apart than this are clearly different.
 inline constexpr double kDifferentPositionM = 0.05, kDifferentRotationRad = 0.02;
 bool IsClearlyDifferent(const Rigid3& a_from_world, const Rigid3& b_from_world);
+
+/// Whether a pose is less than 3 deviations from the prior, in position and in rotation. A prior
+/// may be worse than it claims, but a pose that contradicts it is more likely another place that
+/// looks alike.
+bool IsPlausible(const Rigid3& cam_from_world, const PosePrior& prior);
+
+/// Of 6, directions of the pose that matches of this information determine: four times better than
+/// a prior would that is no tighter than 10 cm / 2 deg. The factor is for the fused lines' own
+/// errors of direction, which make parallel lines look a little less parallel; a tighter prior must
+/// not make good lines look bad.
+/// @param information  Scaled to the residuals' real size.
+int CountObservedDirections(const Matrix6d& information, const PosePrior& prior);
 
 /// @return kRefined unless a rule of docs/method/association.md ("Status") speaks against it.
 RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options);

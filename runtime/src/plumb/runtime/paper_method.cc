@@ -110,10 +110,9 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
       .refined = MeasureSupport(input.camera, refined),
       .prior = MeasureSupport(input.camera, prior),
       .num_pairs = observations_.size(),
-      .num_observed_directions =
-          Observe(terms.equations.information / (std::max(terms.residual_scale, 1.0) * factor),
-                  prior_information)
-              .num_observed};
+      .num_observed_directions = CountObservedDirections(
+          terms.equations.information / (std::max(terms.residual_scale, 1.0) * factor),
+          input.prior)};
   result->status =
       Decide(evidence, {.min_map_support = options_.min_map_support, .min_gain = kMinGain});
   result->map_support = evidence.refined.map_share;

@@ -21,7 +21,8 @@ namespace plumb {
 enum class RefineStatus {
   kRefined,
   kKeptPrior,   // the best pose found does not explain the lines better than the prior does
-  kAmbiguous,   // a clearly different pose explains the lines as well
+  kAmbiguous,   // a clearly different pose explains the lines as well, or the best one contradicts
+                // the prior by 3 deviations and more
   kDegenerate,  // the matched lines leave a direction of the pose unobserved
   kLowSupport,  // too few lines, or too little of the visible map was found in the image
 };
@@ -81,10 +82,11 @@ struct RefineResult {
   /// Of the left perturbation (rotation [rad], translation [m]) of cam_from_world; the prior's own
   /// unless kRefined.
   Matrix6d covariance = Matrix6d::Identity();
-  int num_observed_directions = 0;  // of 6, directions that the matches determine better than the prior
-  double map_support = 0.0;         // share of the visible map's length that was found, 0..1
-  double runner_up_ratio = 0.0;     // support of the best clearly different pose over the winner's
-  std::vector<LineMatch> matches;   // at cam_from_world
+  int num_observed_directions =
+      0;                     // of 6, directions that the matches determine better than the prior
+  double map_support = 0.0;  // share of the visible map's length that was found, 0..1
+  double runner_up_ratio = 0.0;    // support of the best clearly different pose over the winner's
+  std::vector<LineMatch> matches;  // at cam_from_world
   uint32_t num_points_used = 0;
   // Time of the stages [ns].
   int64_t search_ns = 0, match_and_refine_ns = 0, total_ns = 0;

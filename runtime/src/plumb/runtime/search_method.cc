@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "plumb/geometry/line_projection.h"
 #include "plumb/refine/uncertainty.h"
 
 namespace plumb {
@@ -22,12 +21,19 @@ constexpr double kSearchGain = 1.03, kStreamGain = 1.0;
 // A second attempt looks twice as far. A prior that was found good needs none.
 constexpr double kWideningFactor = 2.0;
 constexpr uint32_t kMaxHypotheses = 2048;
+// The farther the search looks, the more likely another place explains the segments: the second
+// attempt has to find twice the map's share, and not to contradict the prior as it was given.
+constexpr AttemptGate kFirstGate{.map_support_factor = 1.0};
+constexpr AttemptGate kSecondGate{.map_support_factor = 2.0};
 
 constexpr size_t kMinLocalLines = 20;
 
 // Points that take part in the joint solution lie this near to the lines' pose.
-constexpr double kPointGatePx = 10.0;
 constexpr size_t kMinPoints = 6;
+// A pose from points alone is a start for the lines, and with many points an answer.
+constexpr size_t kMinSolvingPoints = 12, kMinDecidingPoints = 40;
+
+constexpr double kMinScale = 0.02;  // of residuals: perfect input must not divide by zero
 
 // Of the pairs that are reported as matches.
 constexpr AssociationGates kMatchGates{.sigma_px = 2.0, .sigma_sine = 0.05};
@@ -58,52 +64,90 @@ SearchMethod::SearchMethod(const MapIndex& index, const PoseRefinerOptions& opti
 void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   const int64_t start_ns = NowNs();
   segments_.Assign(input.segments, kMaxSegments);
-  Attempt attempt = Try(input, input.prior, options_.num_hypotheses);
+  AcceptPoints(input);
   PosePrior prior = input.prior;
-  const bool may_widen =
-      input.search &&
-      (attempt.status == RefineStatus::kLowSupport || attempt.status == RefineStatus::kAmbiguous ||
-       attempt.status == RefineStatus::kKeptPrior) &&
-      IsClearlyDifferent(attempt.alignment.cam_from_world, prior.cam_from_world);
+  Attempt attempt = Try(input, prior, options_.num_hypotheses, kFirstGate);
   int64_t search_ns = attempt.search_ns;
-  if (may_widen) {
+  if (input.search && MayWiden(attempt, prior.cam_from_world)) {
     PosePrior wide = prior;
     wide.position_sigma_m *= kWideningFactor;
     wide.rotation_sigma_rad *= kWideningFactor;
-    const Attempt second = Try(input, wide, std::min(kMaxHypotheses, 2 * options_.num_hypotheses));
+    const Attempt second =
+        Try(input, wide, std::min(kMaxHypotheses, 2 * options_.num_hypotheses), kSecondGate);
     search_ns += second.search_ns;
     if (second.status == RefineStatus::kRefined) {
       attempt = second;
       prior = wide;
     }
   }
-
-  result->status = attempt.status;
   result->map_support = attempt.evidence.refined.map_share;
   result->runner_up_ratio = attempt.evidence.runner_up_ratio;
   result->num_observed_directions = attempt.evidence.num_observed_directions;
-  if (attempt.status == RefineStatus::kRefined) {
-    FineAlignment& alignment = attempt.alignment;
-    FinishOnLocalLines(input, WeakFactor(prior), &alignment);
-    FinishWithPoints(input, WeakFactor(prior), &alignment);
-    const Matrix6d prior_information = PriorInformation(prior);
-    const double factor = index_.map().covariance_factor;
-    const Matrix6d information =
-        alignment.line_information + alignment.residual_scale * alignment.point_information;
-    result->cam_from_world = alignment.cam_from_world;
-    result->covariance =
-        PoseCovariance(information, alignment.residual_scale, factor, prior_information);
-    result->num_observed_directions =
-        Observe(information / (alignment.residual_scale * factor), prior_information).num_observed;
-    result->num_points_used = static_cast<uint32_t>(alignment.num_points);
+  result->status = attempt.status;
+  if (attempt.status != RefineStatus::kRefined && HoldsByPoints(input)) {
+    // The lines do not decide, the points do.
+    result->status = RefineStatus::kRefined;
+    attempt.alignment = FineAlignment{};
+    attempt.alignment.cam_from_world = point_pose_.cam_from_world;
   }
+  if (result->status == RefineStatus::kRefined) Finish(input, prior, attempt.alignment, result);
   ReportMatches(input.camera, result->cam_from_world, result);
   result->search_ns = search_ns;
   result->match_and_refine_ns = NowNs() - start_ns - search_ns;
 }
 
+void SearchMethod::Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
+                          RefineResult* result) {
+  FinishOnLocalLines(input, WeakFactor(prior), &alignment);
+  FinishWithPoints(input, WeakFactor(prior), &alignment);
+  // Both families in units of the lines' own residuals, which the covariance divides out again.
+  const Matrix6d information =
+      alignment.line_information + alignment.residual_scale * alignment.point_information;
+  const Matrix6d prior_information = PriorInformation(prior);
+  const double factor = index_.map().covariance_factor;
+  result->cam_from_world = alignment.cam_from_world;
+  result->covariance =
+      PoseCovariance(information, alignment.residual_scale, factor, prior_information);
+  result->num_observed_directions =
+      Observe(information / (std::max(alignment.residual_scale, kMinScale) * factor),
+              prior_information)
+          .num_observed;
+  result->num_points_used = static_cast<uint32_t>(alignment.num_points);
+}
+
+void SearchMethod::AcceptPoints(const RefineInput& input) {
+  all_points_.clear();
+  for (const PointMatch& match : input.points) {
+    all_points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
+  }
+  point_pose_ = {};
+  if (all_points_.size() >= kMinSolvingPoints) {
+    point_pose_ = point_solver_.Solve(input.camera, WeakFactor(input.prior), all_points_);
+  }
+}
+
+bool SearchMethod::HoldsByPoints(const RefineInput& input) const {
+  return point_pose_.num_inliers >= kMinDecidingPoints &&
+         2 * point_pose_.num_inliers >= all_points_.size() &&
+         IsPlausible(point_pose_.cam_from_world, input.prior);
+}
+
+bool SearchMethod::MayWiden(const Attempt& attempt, const Rigid3& prior) {
+  switch (attempt.status) {
+    case RefineStatus::kLowSupport:
+    case RefineStatus::kAmbiguous:
+      return true;
+    case RefineStatus::kKeptPrior:  // A prior that the search came back to is trusted.
+      return IsClearlyDifferent(attempt.alignment.cam_from_world, prior);
+    case RefineStatus::kRefined:
+    case RefineStatus::kDegenerate:
+      return false;
+  }
+  return false;
+}
+
 SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrior& prior,
-                                        uint32_t num_hypotheses) {
+                                        uint32_t num_hypotheses, const AttemptGate& gate) {
   Attempt attempt;
   attempt.alignment.cam_from_world = prior.cam_from_world;
   selector_.SelectForSearch(input.camera, prior.cam_from_world, prior.rotation_sigma_rad,
@@ -115,15 +159,16 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
   attempt.search_ns = NowNs() - start_ns;
   const auto schedule = input.search ? FineSchedule() : StreamSchedule();
   survivors_.clear();
-  for (const FoundPose& start : starts) {
-    selector_.SelectForAlignment(input.camera, start.cam_from_world, &fine_lines_);
-    if (fine_lines_.size() < kMinLines) continue;
-    Survivor survivor;
-    survivor.alignment = aligner_.Align(input.camera, start.cam_from_world, fine_lines_, segments_,
-                                        schedule, WeakFactor(prior));
+  const auto align_from = [&](const Rigid3& start) {
+    selector_.SelectForAlignment(input.camera, start, &fine_lines_);
+    if (fine_lines_.size() < kMinLines) return;
+    Survivor& survivor = survivors_.emplace_back();
+    survivor.alignment =
+        aligner_.Align(input.camera, start, fine_lines_, segments_, schedule, WeakFactor(prior));
     survivor.support = MeasureSupport(input.camera, survivor.alignment.cam_from_world);
-    survivors_.push_back(survivor);
-  }
+  };
+  for (const FoundPose& start : starts) align_from(start.cam_from_world);
+  if (point_pose_.num_inliers >= kMinSolvingPoints) align_from(point_pose_.cam_from_world);
   if (survivors_.empty()) return attempt;
   const Survivor& best = *std::max_element(
       survivors_.begin(), survivors_.end(),
@@ -138,17 +183,17 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
   const double common_scale =
       std::max(best.alignment.residual_scale, 1.0) * index_.map().covariance_factor;
   attempt.alignment = best.alignment;
-  attempt.evidence = {
-      .refined = best.support,
-      .prior = MeasureSupport(input.camera, prior.cam_from_world),
-      .runner_up_ratio = value > 0.0 ? runner_up / value : 0.0,
-      .num_pairs = best.alignment.num_pairs,
-      .num_observed_directions =
-          Observe(best.alignment.line_information / common_scale, PriorInformation(prior))
-              .num_observed};
-  attempt.status = Decide(attempt.evidence, {.min_map_support = options_.min_map_support,
-                                             .min_gain = input.search ? kSearchGain : kStreamGain,
-                                             .needs_all_directions = input.search});
+  attempt.evidence = {.refined = best.support,
+                      .prior = MeasureSupport(input.camera, prior.cam_from_world),
+                      .runner_up_ratio = value > 0.0 ? runner_up / value : 0.0,
+                      .is_near_prior = IsPlausible(best.alignment.cam_from_world, input.prior),
+                      .num_pairs = best.alignment.num_pairs,
+                      .num_observed_directions = CountObservedDirections(
+                          best.alignment.line_information / common_scale, prior)};
+  attempt.status = Decide(attempt.evidence,
+                          {.min_map_support = gate.map_support_factor * options_.min_map_support,
+                           .min_gain = input.search ? kSearchGain : kStreamGain,
+                           .needs_all_directions = input.search});
   return attempt;
 }
 
@@ -178,25 +223,27 @@ PoseSupport SearchMethod::MeasureSupport(const Camera& camera, const Rigid3& cam
 void SearchMethod::FinishOnLocalLines(const RefineInput& input, const PosePriorFactor& prior,
                                       FineAlignment* alignment) {
   selector_.SelectLocal(input.camera, alignment->cam_from_world, &local_lines_);
-  if (local_lines_.size() < kMinLocalLines) return;
+  if (local_lines_.size() < kMinLocalLines) {
+    selector_.SelectForAlignment(input.camera, alignment->cam_from_world, &fine_lines_);
+    return;
+  }
   *alignment = aligner_.Align(input.camera, alignment->cam_from_world, local_lines_, segments_,
                               LocalSchedule(), prior);
 }
 
 void SearchMethod::FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
                                     FineAlignment* alignment) {
-  points_.clear();
-  for (const PointMatch& match : input.points) {
-    const Eigen::Vector3d x = alignment->cam_from_world * match.point_in_world;
-    if (!(x.z() > kNearPlane)) continue;
-    if (!((input.camera.Project(x) - match.pixel).norm() < kPointGatePx)) continue;
-    points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
+  near_points_.clear();
+  for (const PointObservation& point : all_points_) {
+    if (ReprojectsNear(input.camera, alignment->cam_from_world, point)) {
+      near_points_.push_back(point);
+    }
   }
-  if (points_.size() < kMinPoints) return;
+  if (near_points_.size() < kMinPoints) return;
   const std::vector<CandidateLine>& lines =
       local_lines_.size() < kMinLocalLines ? fine_lines_ : local_lines_;
   *alignment = aligner_.Align(input.camera, alignment->cam_from_world, lines, segments_,
-                              JointSchedule(), prior, points_);
+                              JointSchedule(), prior, near_points_);
 }
 
 void SearchMethod::ReportMatches(const Camera& camera, const Rigid3& cam_from_world,

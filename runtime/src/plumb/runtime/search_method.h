@@ -11,10 +11,16 @@
 #include "plumb/runtime/acceptance_gate.h"
 #include "plumb/runtime/fine_alignment.h"
 #include "plumb/runtime/line_selection.h"
+#include "plumb/runtime/point_solver.h"
 #include "plumb/runtime/pose_refiner.h"
 #include "plumb/search/pose_search.h"
 
 namespace plumb {
+
+/// How much more than usual an attempt must find to be accepted.
+struct AttemptGate {
+  double map_support_factor = 1.0;  // times PoseRefinerOptions::min_map_support
+};
 
 /// One per PoseRefiner; input must have been checked. Owns all work space.
 /// Source: docs/method/association.md, "search".
@@ -39,10 +45,19 @@ class SearchMethod {
     PoseSupport support;
   };
 
-  Attempt Try(const RefineInput& input, const PosePrior& prior, uint32_t num_hypotheses);
+  Attempt Try(const RefineInput& input, const PosePrior& prior, uint32_t num_hypotheses,
+              const AttemptGate& gate);
+  /// Whether a search with a larger uncertainty can still help.
+  static bool MayWiden(const Attempt& attempt, const Rigid3& prior);
+  /// Solves the pose from the points alone, if there are enough.
+  void AcceptPoints(const RefineInput& input);
+  bool HoldsByPoints(const RefineInput& input) const;
   std::span<const FoundPose> FindStarts(const RefineInput& input, const PosePrior& prior,
                                         uint32_t num_hypotheses);
   PoseSupport MeasureSupport(const Camera& camera, const Rigid3& cam_from_world);
+  /// The last steps of a pose that was accepted, and its covariance.
+  void Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
+              RefineResult* result);
   void FinishOnLocalLines(const RefineInput& input, const PosePriorFactor& prior,
                           FineAlignment* alignment);
   void FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
@@ -62,7 +77,9 @@ class SearchMethod {
   SupportMeter support_meter_;
   ProjectedLines projected_;
   std::vector<Survivor> survivors_;
-  std::vector<PointObservation> points_;
+  PointSolver point_solver_;
+  PointPose point_pose_;  // without inliers: none
+  std::vector<PointObservation> all_points_, near_points_;
   SoftAssociator associator_;
   std::vector<LinePair> pairs_;
   std::vector<int32_t> best_pair_;  // per segment

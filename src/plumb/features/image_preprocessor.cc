@@ -91,7 +91,7 @@ ImagePreprocessor::ImagePreprocessor(const Options& options) : options_(options)
 }
 
 Result<std::unique_ptr<ImagePreprocessor>> ImagePreprocessor::Create(
-    std::shared_ptr<gpu::Device> device, const Options& options) {
+    const std::shared_ptr<gpu::Device>& device, const Options& options) {
   if (const Status valid = Check(options); !valid) return valid.error();
   std::unique_ptr<ImagePreprocessor> preprocessor(new ImagePreprocessor(options));
 

@@ -27,8 +27,8 @@ class ImagePreprocessor {
   };
 
   /// @return kInvalidArgument that names a size out of range; errors of the device.
-  static Result<std::unique_ptr<ImagePreprocessor>> Create(std::shared_ptr<gpu::Device> device,
-                                                           const Options& options);
+  static Result<std::unique_ptr<ImagePreprocessor>> Create(
+      const std::shared_ptr<gpu::Device>& device, const Options& options);
 
   /// Copies the planes to memory that the device reads. Not while a recorded list is in flight.
   /// Precondition: a valid image of this preprocessor's size and format.

@@ -48,8 +48,9 @@ std::vector<DecodedLine> DecodeLinesReference(std::span<const float> planes,
   const float px_per_cell_y = static_cast<float>(image_height_px) / static_cast<float>(height);
   for (DecodedLine& line : lines) {
     const size_t cell = line.cell;
-    const float x = static_cast<float>(static_cast<int>(cell) % width) + Sigmoid(plane(2, cell));
-    const float y = static_cast<float>(static_cast<int>(cell) / width) + Sigmoid(plane(3, cell));
+    const int column = static_cast<int>(cell) % width, row = static_cast<int>(cell) / width;
+    const float x = static_cast<float>(column) + Sigmoid(plane(2, cell));
+    const float y = static_cast<float>(row) + Sigmoid(plane(3, cell));
     float dx = options.displacement_scale * plane(4, cell);
     float dy = options.displacement_scale * plane(5, cell);
     if (dx < 0.0f || (dx == 0.0f && dy < 0.0f)) {

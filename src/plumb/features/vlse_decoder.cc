@@ -103,7 +103,7 @@ Result<std::unique_ptr<VlseDecoder>> VlseDecoder::Create(std::shared_ptr<gpu::De
   if (!status) return status.error();
 
   const uint64_t cell_bytes = uint64_t{4} * width * height;
-  const uint64_t chosen_score_bytes = uint64_t{4} * ((max_lines + 4 + 3) / 4 * 4);
+  const uint64_t chosen_score_bytes = uint64_t{16} * ((max_lines + 4 + 3) / 4);
   const uint64_t chosen_cell_bytes = uint64_t{4} * max_lines;
   gpu::BufferLayout layout(*device);
   const uint64_t cell_scores = layout.Append(cell_bytes);

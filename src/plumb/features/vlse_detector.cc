@@ -70,7 +70,7 @@ Status VlseDetector::WarmUp() {
   image.format = PixelFormat::kRgb8;
   image.width_px = info.input_width;
   image.height_px = info.input_height;
-  image.planes[0] = {black.data(), 3 * info.input_width};
+  image.planes[0] = {black.data(), int64_t{3} * info.input_width};
   const Result<std::vector<Segment2>> segments = Detect(image);
   if (!segments) return segments.error();
   return Ok();

@@ -60,7 +60,8 @@ Kernel::~Kernel() {
       vulkan.handle, static_cast<VkDescriptorSetLayout>(set_layout_), nullptr);
 }
 
-Result<std::unique_ptr<Kernel>> Kernel::Create(std::shared_ptr<Device> device, KernelInfo info) {
+Result<std::unique_ptr<Kernel>> Kernel::Create(std::shared_ptr<Device> device,
+                                               const KernelInfo& info) {
   const VulkanDevice& vulkan = device->Vulkan();
   if (const Status valid = Check(info, vulkan.info.limits); !valid) return valid.error();
   std::unique_ptr<Kernel> kernel(new Kernel(std::move(device), info));

@@ -53,12 +53,13 @@ struct KernelInfo {
   std::vector<SpecConstant> spec_constants = {};
 };
 
-/// A pipeline, compiled at Create(); lavapipe compiles at the first dispatch instead.
+/// A pipeline, compiled at Create(); some drivers compile at the first dispatch.
 class Kernel {
  public:
   /// @return kInvalidArgument for an empty or malformed KernelInfo, kUnsupported for one beyond the
   /// device's limits.
-  static Result<std::unique_ptr<Kernel>> Create(std::shared_ptr<Device> device, KernelInfo info);
+  static Result<std::unique_ptr<Kernel>> Create(std::shared_ptr<Device> device,
+                                                const KernelInfo& info);
   ~Kernel();
   Kernel(const Kernel&) = delete;
   Kernel& operator=(const Kernel&) = delete;

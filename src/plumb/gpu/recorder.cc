@@ -77,7 +77,7 @@ Recorder::Recorder(std::shared_ptr<Device> device, RecorderOptions options)
 
 Recorder::~Recorder() = default;
 
-Result<std::unique_ptr<Recorder>> Recorder::Create(std::shared_ptr<Device> device,
+Result<std::unique_ptr<Recorder>> Recorder::Create(const std::shared_ptr<Device>& device,
                                                    RecorderOptions options) {
   const VulkanDevice& vulkan = device->Vulkan();
   std::unique_ptr<Recorder> recorder(new Recorder(device, std::move(options)));

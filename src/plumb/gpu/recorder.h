@@ -40,7 +40,7 @@ struct RecorderOptions {
 /// a kernel that reads and writes the same bytes) is kept and returned by Finish().
 class Recorder {
  public:
-  static Result<std::unique_ptr<Recorder>> Create(std::shared_ptr<Device> device,
+  static Result<std::unique_ptr<Recorder>> Create(const std::shared_ptr<Device>& device,
                                                   RecorderOptions options = {});
   ~Recorder();
   Recorder(const Recorder&) = delete;

@@ -1,6 +1,6 @@
 """sAP of a weights file or training state on a folder with images/ and annotations.json.
 
-usage: evaluate.py WEIGHTS DIR [--size N] [--top-k N] [--nms-decay X] [--detections OUT.json]
+usage: evaluate.py WEIGHTS DIR [--size N] [--score-threshold X] [--top-k N] [--nms-decay X] [--detections OUT.json]
 """
 import argparse
 import json
@@ -76,16 +76,20 @@ def main():
     parser.add_argument("weights", help=".safetensors file")
     parser.add_argument("data", help="folder with images/ and annotations.json")
     parser.add_argument("--size", type=int, help="input edge in pixels; default: the file's")
-    parser.add_argument("--top-k", type=int, default=TOP_K)
-    parser.add_argument("--nms-decay", type=float, help="score factor of non-maxima; default: the file's")
+    parser.add_argument("--score-threshold", type=float, help="default: the file's, like all of these")
+    parser.add_argument("--top-k", type=int, help="at most so many lines per image")
+    parser.add_argument("--nms-decay", type=float, help="score factor of non-maxima")
     parser.add_argument("--detections", help="also write the segments as JSON")
     args = parser.parse_args()
     model, metadata = weights_file.load_model(args.weights)
-    decay = float(metadata["nms_decay"]) if args.nms_decay is None else args.nms_decay
+    given = {"score_threshold": args.score_threshold, "top_k": args.top_k, "nms_decay": args.nms_decay}
+    chosen = {k: float(metadata[k]) if v is None else v for k, v in given.items()}
     annotated = load_annotated(args.data)
     size = args.size or int(metadata["input_width"])
-    scale = float(metadata["displacement_scale"])
-    values, detections = score(model, annotated, size, displacement_scale=scale, top_k=args.top_k, nms_decay=decay)
+    values, detections = score(
+        model, annotated, size, displacement_scale=float(metadata["displacement_scale"]), top_k=int(chosen["top_k"]),
+        nms_decay=chosen["nms_decay"], threshold=chosen["score_threshold"],
+    )
     print(json.dumps({"sAP5": values[0], "sAP10": values[1], "sAP15": values[2], "images": len(annotated), "size": size}))
     if args.detections:
         rows = [

@@ -23,6 +23,7 @@
 // Reference   src/plumb/nn/reference/layer_reference.h     Test  tests/nn/cpu_simd_kernels_test.cc
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_shuffle : require
 #ifdef WEIGHT_ADDRESS
@@ -51,11 +52,11 @@ layout(binding = 3) uniform samplerBuffer add_texels;
 layout(binding = 4) uniform samplerBuffer low_texels;
 layout(scalar, binding = 5) writeonly buffer Out { dvec4 out_data[]; };
 #ifdef WEIGHT_ADDRESS
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Pair { uint64_t data; };
 layout(push_constant, scalar) uniform Push { int height; int width; uint64_t weights; } p;
 #else
 layout(push_constant, scalar) uniform Push { int height; int width; } p;
 #endif
+#include "p8_weights.glsl"
 
 #if SHAPE == 0
 const uint kTaps = 1u, kSpan = 2u;
@@ -72,28 +73,6 @@ const int kOutside = 0x3fff0000;  // Beyond every buffer: texelFetch returns 0 t
 int BlockTexel(int row, int column, int blocks) {
   const bool inside = row >= 0 && row < p.height && column >= 0 && column < blocks;
   return inside ? 2 * ((row * blocks + column) * int(kInTotal) + int(kInFirst)) : kOutside;
-}
-
-// One texel per lane: 32 weights of a row from position `first` on, as w[n % 4] of lane n / 4 % 8
-// (texels) or in pairs from an address.
-vec4 FetchWeights(uint row_start, uint first, uint lane) {
-#ifdef WEIGHT_ADDRESS
-  const uint64_t at = p.weights + uint64_t(row_start + first + 2u * lane) * 4ul;
-  vec4 w;
-  w.xy = uintBitsToFloat(unpackUint2x32(Pair(at).data));
-  w.zw = uintBitsToFloat(unpackUint2x32(Pair(at + 64ul).data));
-  return w;
-#else
-  return texelFetch(weights, int((row_start + first) / 4u + lane));
-#endif
-}
-
-float Weight(vec4 w, uint n) {
-#ifdef WEIGHT_ADDRESS
-  return subgroupShuffle(w[n % 32u / 16u * 2u + n % 2u], n % 16u / 2u);
-#else
-  return subgroupShuffle(w[n % 4u], n % 32u / 4u);
-#endif
 }
 
 // x holds windows of 8 pixels at every tap, two vectors each, so that no pixel is addressed alone: few

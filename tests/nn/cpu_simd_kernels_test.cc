@@ -18,7 +18,7 @@ class CpuSimdKernels : public PlanTest {
     if (!missing.empty()) GTEST_SKIP() << missing;
   }
 
-  void Check(const LayerPlan& plan, WeightSource weights = WeightSource::kTexels) {
+  void Check(const LayerPlan& plan, const CpuSimdOptions& options = {}) {
     const auto features = RandomInputs(plan);
     const int output = plan.layers.back().output;
     const auto expected = reference::RunLayer(plan, plan.layers.back(), features);
@@ -28,7 +28,7 @@ class CpuSimdKernels : public PlanTest {
       inputs[i] = static_cast<int>(i) == plan.input ? features[i]
                                                     : PlanarToP8(plan.features[i], features[i]);
     }
-    const auto raw = Run(PlanCpuSimd(plan, {.weights = weights}), inputs, output);
+    const auto raw = Run(PlanCpuSimd(plan, options), inputs, output);
     const Feature& shape = plan.features[output];
     if (output == plan.output) {
       EXPECT_LT(RelativeError(raw, expected), kTolerance);
@@ -88,13 +88,24 @@ TEST_F(CpuSimdKernels, PlanarOutput) {
   Check({.in = 48, .out = 6, .height = 16, .width = 24, .planar_output = true});
 }
 
-TEST_F(CpuSimdKernels, SquareOnOddShapes) {
+TEST_F(CpuSimdKernels, SquareDirectly) {
+  const CpuSimdOptions direct{.winograd = false};
+  Check(MakeLayerPlan({.taps = Taps::k3x3, .in = 16, .out = 16, .height = 5, .width = 5}), direct);
+  Check(MakeLayerPlan(
+            {.taps = Taps::k3x3, .in = 32, .out = 48, .height = 9, .width = 24, .relu = true}),
+        direct);
+  Check(MakeLayerPlan(
+            {.taps = Taps::k3x3, .in = 80, .out = 8, .height = 6, .width = 12, .relu = true}),
+        direct);
+}
+
+TEST_F(CpuSimdKernels, SquareByWinogradOnOddShapes) {
   Check({.taps = Taps::k3x3, .in = 16, .out = 16, .height = 5, .width = 5});
   Check({.taps = Taps::k3x3, .in = 32, .out = 48, .height = 9, .width = 24, .relu = true});
   Check({.taps = Taps::k3x3, .in = 4, .out = 8, .height = 1, .width = 33});
 }
 
-TEST_F(CpuSimdKernels, SquareSplitIntoPartialSums) {
+TEST_F(CpuSimdKernels, SquareByWinogradSplitIntoPartialSums) {
   Check({.taps = Taps::k3x3, .in = 80, .out = 8, .height = 6, .width = 12, .relu = true});
 }
 
@@ -119,7 +130,7 @@ TEST_F(CpuSimdKernels, WeightsByAddress) {
   for (const Taps taps : {Taps::k1x1, Taps::k3x3, Taps::kCross7}) {
     Check(
         MakeLayerPlan({.taps = taps, .in = 20, .out = 16, .height = 5, .width = 12, .relu = true}),
-        WeightSource::kAddress);
+        {.weights = WeightSource::kAddress});
   }
 }
 
@@ -140,7 +151,7 @@ TEST(CpuSimdLayout, ConversionsAreInverse) {
   const Feature shape{3, 5, 13};
   const auto planar = RandomValues(PlanarSize(shape), 1);
   EXPECT_EQ(P8ToPlanar(shape, PlanarToP8(shape, planar)), planar);
-  EXPECT_EQ(P8Size(shape), 16u * 3u * 8u);
+  EXPECT_EQ(P8Size(shape), 16u * 3u * 8u);  // 8 rows of 2 blocks: whole groups.
 }
 
 TEST(CpuSimdOptions, FollowTheDriverVersion) {

@@ -9,7 +9,7 @@
 namespace plumb::gpu {
 namespace {
 
-constexpr uint32_t kMaxStages = 63;
+constexpr uint32_t kMaxStages = 255;
 constexpr uint32_t kSetsPerPool = 64;
 constexpr uint32_t kDescriptorsPerPool = 512;
 

@@ -2,19 +2,33 @@
 #include "plumb/nn/ops/cpu_simd.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstdio>
+#include <limits>
+
+#include "plumb/nn/ops/winograd.h"
 
 namespace plumb::nn {
 namespace {
 
-constexpr int kBlock = 8;         // Pixels of a block.
-constexpr int kLanes = 8;         // Blocks of a workgroup.
-constexpr int kWeightGroup = 32;  // Weights of one fetch.
+constexpr int kBlock = 8;                       // Pixels of a block.
+constexpr uint32_t kOutsideTexel = 0x3fff0000;  // Beyond every texel buffer; reads as zero.
+constexpr int kTileRows = 4;                    // Rows that a lane of the Winograd kernel makes.
+constexpr int kLanes = 8;                       // Blocks of a workgroup.
+constexpr int kWeightGroup = 32;                // Weights of one fetch.
 
 int RoundUp(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
 
 int Blocks(const Feature& feature) {
   return feature.height * (RoundUp(feature.width, kBlock) / kBlock);
+}
+
+// Workgroups of the Winograd kernel, whose lanes own 4 rows of a block.
+int WinogradGroupsOf(const Feature& feature) {
+  const int tiles =
+      RoundUp(feature.height, kTileRows) / kTileRows * (RoundUp(feature.width, kBlock) / kBlock);
+  return RoundUp(tiles, kLanes) / kLanes;
 }
 
 int GroupsOf(const Feature& feature) { return RoundUp(Blocks(feature), kLanes) / kLanes; }
@@ -30,6 +44,9 @@ int MaxInputs(Taps taps) {
       return 32;
   }
 }
+
+// Transformed inputs of 16 channels, 36 KB, just stay in the first-level cache.
+constexpr int kMaxWinogradInputs = 16;
 
 const char* ShaderName(Taps taps, WeightSource source) {
   const bool address = source == WeightSource::kAddress;
@@ -132,7 +149,11 @@ class Planner {
   void Conv(const Layer& layer) {
     const int in = At(layer.input).channels;
     const int total = in + (layer.extra_input >= 0 ? At(layer.extra_input).channels : 0);
-    const int parts = (total + MaxInputs(layer.taps) - 1) / MaxInputs(layer.taps);
+    const bool winograd = layer.taps == Taps::k3x3 && options_.winograd && layer.residual < 0 &&
+                          layer.upsampled < 0 && layer.prologue_scale.empty() &&
+                          layer.output != layers_.output;
+    const int most = winograd ? kMaxWinogradInputs : MaxInputs(layer.taps);
+    const int parts = (total + most - 1) / most;
     const int step = RoundUp((total + parts - 1) / parts, 4);
     int partial = -1;
     for (int begin = 0; begin < total; begin += step) {
@@ -143,9 +164,67 @@ class Planner {
         target = static_cast<int>(plan_.tensor_bytes.size());
         plan_.tensor_bytes.push_back(P8Size(At(layer.output)) * sizeof(float));
       }
-      ConvPart(layer, begin, end, partial, target);
+      if (winograd) {
+        WinogradPart(layer, begin, end, partial, target);
+      } else {
+        ConvPart(layer, begin, end, partial, target);
+      }
       partial = target;
     }
+  }
+
+  void WinogradPart(const Layer& layer, int begin, int end, int partial, int target) {
+    const Feature& in = At(layer.input);
+    const Feature& out = At(layer.output);
+    const int groups = WinogradGroupsOf(out);
+    const int split = SplitOutputs(groups, out.channels);
+    const bool last = target == layer.output;
+    DispatchInfo dispatch;
+    dispatch.name = layer.name;
+    if (partial >= 0 || !last) dispatch.name += PartName(begin, end);
+    dispatch.shader =
+        options_.weights == WeightSource::kAddress ? "nn/p8_winograd_address" : "nn/p8_winograd";
+    const float floor = layer.relu && last ? 0.0f : std::numeric_limits<float>::lowest();
+    dispatch.spec_constants = Spec({end - begin});
+    dispatch.push = {static_cast<uint32_t>(out.height),   static_cast<uint32_t>(out.width),
+                     static_cast<uint32_t>(begin),        static_cast<uint32_t>(in.channels),
+                     static_cast<uint32_t>(out.channels), std::bit_cast<uint32_t>(floor),
+                     partial >= 0 ? 0 : kOutsideTexel};
+    if (options_.weights == WeightSource::kAddress)
+      dispatch.push.push_back(0);  // Aligns the address.
+    dispatch.operands = {Constants(), Texels(layer.input),
+                         Texels(partial >= 0 ? partial : layer.input), Output(target)};
+    dispatch.constants = PackWinograd(layer, begin, end, partial < 0);
+    dispatch.pushes_address = options_.weights == WeightSource::kAddress;
+    dispatch.groups = {static_cast<uint32_t>(groups), static_cast<uint32_t>(split), 1};
+    plan_.dispatches.push_back(std::move(dispatch));
+  }
+
+  // [out][position / 4][input][position % 4], then the bias, rows padded to whole fetches.
+  std::vector<float> PackWinograd(const Layer& layer, int begin, int end, bool with_bias) const {
+    const int outputs = At(layer.output).channels, total = At(layer.input).channels;
+    const int inputs = end - begin;
+    const int row = RoundUp(kWinogradPositions * inputs + 1, kWeightGroup);
+    std::vector<float> packed(static_cast<size_t>(outputs) * row, 0.0f);
+    for (int o = 0; o < outputs; ++o) {
+      float* to = &packed[static_cast<size_t>(o) * row];
+      for (int i = 0; i < inputs; ++i) {
+        std::array<double, 9> kernel;
+        for (int t = 0; t < 9; ++t) {
+          kernel[t] = layer.weights[(static_cast<size_t>(o) * 9 + t) * total + begin + i];
+        }
+        const auto transformed = WinogradKernel(kernel);
+        for (int p = 0; p < kWinogradPositions; ++p) {
+          to[(p / 4 * inputs + i) * 4 + p % 4] = static_cast<float>(transformed[p]);
+        }
+      }
+      to[kWinogradPositions * inputs] = with_bias ? layer.bias[o] : 0.0f;
+    }
+    return packed;
+  }
+
+  static std::string PartName(int begin, int end) {
+    return " [" + std::to_string(begin) + "," + std::to_string(end) + ")";
   }
 
   // Inputs [begin, end) of the layer's concatenated inputs; `partial` is the sum of those before.
@@ -170,8 +249,7 @@ class Planner {
 
     DispatchInfo dispatch;
     dispatch.name = layer.name;
-    if (!(first && last))
-      dispatch.name += " [" + std::to_string(begin) + "," + std::to_string(end) + ")";
+    if (!(first && last)) dispatch.name += PartName(begin, end);
     dispatch.shader = ShaderName(layer.taps, options_.weights);
     dispatch.spec_constants =
         Spec({in_end - in_first, in_first, in.channels, extra_end - extra_first, extra_first,
@@ -259,7 +337,9 @@ DispatchPlan PlanCpuSimd(const LayerPlan& plan, const CpuSimdOptions& options) {
 }
 
 size_t P8Size(const Feature& feature) {
-  return static_cast<size_t>(GroupsOf(feature)) * kLanes * feature.channels * kBlock;
+  Feature padded = feature;
+  padded.height = RoundUp(feature.height, kTileRows);
+  return static_cast<size_t>(GroupsOf(padded)) * kLanes * feature.channels * kBlock;
 }
 
 std::vector<float> PlanarToP8(const Feature& feature, std::span<const float> planar) {

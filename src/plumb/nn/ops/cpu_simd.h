@@ -18,6 +18,7 @@ enum class WeightSource {
 
 struct CpuSimdOptions {
   WeightSource weights = WeightSource::kTexels;
+  bool winograd = true;  ///< 3x3 by F(4x4, 3x3) instead of directly.
 };
 
 /// Options for a device by its driver version.
@@ -27,7 +28,8 @@ CpuSimdOptions ChooseCpuSimdOptions(const gpu::DeviceInfo& device);
 std::string MissingForCpuSimd(const gpu::DeviceInfo& device);
 
 /// Dispatches of a layer plan. The plan's input and output are planar, all else in the layout p8:
-/// [row][block of 8 columns][channel][8], rows padded with zeros, buffers to groups of 8 blocks.
+/// [row][block of 8 columns][channel][8], rows padded with zeros, buffers to whole groups of 4 rows
+/// and of 8 blocks.
 DispatchPlan PlanCpuSimd(const LayerPlan& plan, const CpuSimdOptions& options);
 
 /// Floats of a feature in the layout p8.

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -37,13 +36,13 @@ class LineCloud {
 
  private:
   struct Sphere {
-    Eigen::Vector3f center;
-    float radius_m;
+    Eigen::Vector3d center;
+    double radius_m;
   };
   static Sphere Bound(const Segment3& line);
 
   std::vector<Segment3> lines_;
-  std::vector<Sphere> spheres_;  // first test, on a fraction of the memory
+  std::vector<Sphere> spheres_;  // first test, cheaper than a projection
 };
 
 }  // namespace plumb

@@ -11,7 +11,7 @@ namespace plumb {
 namespace {
 
 // Shares of the work, measured on a map of 50 key frames.
-constexpr double kGrown = 0.45, kRefined = 0.6, kSettled = 0.85, kFiltered = 0.95;
+constexpr double kGrown = 0.25, kRefined = 0.3, kSettled = 0.6, kFiltered = 0.95;
 
 uint32_t CountFrames(const ObservationTable& table, const std::vector<uint32_t>& observations) {
   uint32_t count = 0;

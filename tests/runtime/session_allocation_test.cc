@@ -1,0 +1,75 @@
+// The frame path of a session allocates nothing of its own once it is warm.
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "plumb/features/lsd_detector.h"
+#include "plumb/runtime/session.h"
+#include "support/allocation_counter.h"
+#include "support/wall_scene.h"
+
+namespace plumb {
+namespace {
+
+using testing::WallScene;
+
+// Gives the segments that LSD found once: one allocation a frame, which the interface demands.
+class StoredDetector : public LineDetector {
+ public:
+  explicit StoredDetector(std::vector<Segment2> segments) : segments_(std::move(segments)) {}
+  Status Submit(const ImageView&) override { return Ok(); }
+  Result<std::vector<Segment2>> Collect() override { return segments_; }
+  std::string Name() const override { return "lsd"; }
+
+ private:
+  const std::vector<Segment2> segments_;
+};
+
+void ExpectOneAllocationAFrame(SessionMode mode) {
+  // Longer than the ring of results, whose buffers are exchanged.
+  constexpr int kNumWarmUp = 40, kNumFrames = 20;
+  const WallScene scene;
+  const LineMap map = scene.MakeMap(WallScene::KeyFramePoses());
+  const MapIndex index(map);
+  const Rigid3 truth{ExpSo3({0.01, 0.2, -0.01}), Eigen::Vector3d(0.03, 0.0, -0.02)};
+  const auto image = scene.Render(truth);
+  Result<std::vector<Segment2>> segments = CreateLsdDetector()->Detect(image.View());
+  ASSERT_TRUE(segments);
+  SessionOptions options;
+  options.mode = mode;
+  options.policy = FramePolicy::kBlock;
+  Result<std::unique_ptr<Session>> session =
+      Session::Create(index, std::make_unique<StoredDetector>(*std::move(segments)), options);
+  ASSERT_TRUE(session);
+
+  Vector6d error;
+  error << 0.004, -0.003, 0.002, 0.006, -0.005, 0.004;
+  SessionFrame frame;
+  frame.image = image.View();
+  frame.camera = scene.camera;
+  frame.prior.cam_from_world = Perturb(truth, error);
+  FrameResult result;
+  size_t before = 0;
+  for (int i = 0; i < kNumWarmUp + kNumFrames; ++i) {
+    if (i == kNumWarmUp) before = testing::num_allocations;
+    frame.timestamp_ns = i;
+    ASSERT_TRUE((*session)->Submit(frame));
+    ASSERT_TRUE((*session)->Wait(60'000'000'000, &result));
+    ASSERT_EQ(result.refined.status, RefineStatus::kRefined);
+  }
+  EXPECT_EQ(testing::num_allocations - before, static_cast<size_t>(kNumFrames));
+}
+
+TEST(SessionAllocations, StreamAllocatesForTheDetectorOnly) {
+  ExpectOneAllocationAFrame(SessionMode::kStream);
+}
+
+TEST(SessionAllocations, IndependentFramesAllocateForTheDetectorOnly) {
+  ExpectOneAllocationAFrame(SessionMode::kIndependent);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "plumb/nn/layer_plan.h"
@@ -12,7 +13,7 @@ namespace {
 
 constexpr double kNormEpsilon = 1e-5;
 
-const std::vector<float>& Data(const Model& model, const std::string& name) {
+const std::vector<float>& Data(const Model& model, std::string_view name) {
   return model.tensors.find(name)->second.data;
 }
 

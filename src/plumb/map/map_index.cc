@@ -49,6 +49,66 @@ class Frustum {
   double slack_ = 0.0;
 };
 
+/// Whether one camera sees a line, or may see something of a box of lines.
+class ViewTest {
+ public:
+  /// @param counts  For each key frame, whether its sightings count; borrowed.
+  ViewTest(const LineMap& map, const Camera& camera, const Rigid3& cam_from_world,
+           const VisibilityOptions& options, const std::vector<uint8_t>& counts)
+      : map_(map),
+        camera_(camera),
+        options_(options),
+        counts_(counts),
+        frustum_(camera, cam_from_world, options.margin_px),
+        rotation_(cam_from_world.RotationMatrix()),
+        translation_(cam_from_world.translation),
+        center_(cam_from_world.Center()),
+        min_cosine_(options.max_view_angle_rad < std::numbers::pi
+                        ? std::cos(options.max_view_angle_rad)
+                        : -2.0) {}
+
+  /// @param reach_m  Longest sighting of the lines in the box.
+  bool MayShow(const Box& box, double reach_m) const {
+    return box.DistanceTo(center_) <= options_.max_distance_ratio * reach_m &&
+           frustum_.MayContain(box);
+  }
+
+  bool Shows(uint32_t line) const {
+    const MapLine& candidate = map_.lines[line];
+    const Segment3& segment = candidate.segment_in_world;
+    if (candidate.num_observing < options_.min_observing || !IsSeenAlike(line)) return false;
+    const auto visible = ProjectSegmentInCam(
+        camera_, {rotation_ * segment.start + translation_, rotation_ * segment.end + translation_},
+        options_.margin_px);
+    return visible && visible->Length() >= options_.min_length_px;
+  }
+
+ private:
+  /// Some key frame saw the line from a like direction and distance.
+  bool IsSeenAlike(uint32_t line) const {
+    const Eigen::Vector3d ray = center_ - map_.lines[line].segment_in_world.Midpoint();
+    const double distance = ray.norm(), ratio = options_.max_distance_ratio;
+    for (const LineSighting& sighting : map_.SightingsOf(line)) {
+      const double seen_from = static_cast<double>(sighting.distance_m);
+      if (counts_[sighting.key_frame] != 0 && distance < ratio * seen_from &&
+          seen_from < ratio * distance &&
+          sighting.direction_to_camera.cast<double>().dot(ray) > min_cosine_ * distance) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const LineMap& map_;
+  const Camera& camera_;
+  const VisibilityOptions& options_;
+  const std::vector<uint8_t>& counts_;
+  Frustum frustum_;
+  Eigen::Matrix3d rotation_;
+  Eigen::Vector3d translation_, center_;
+  double min_cosine_;
+};
+
 std::vector<Box> BoxesOf(const std::vector<MapLine>& lines) {
   std::vector<Box> boxes;
   boxes.reserve(lines.size());
@@ -139,51 +199,28 @@ void MapIndex::VisibleLines(const Camera& camera, const Rigid3& cam_from_world,
                             std::vector<uint32_t>* out_lines) const {
   out_lines->clear();
   if (!camera.IsValid() || !cam_from_world.IsFinite()) return;
-  const LineMap& map = impl_->map;
-  const Frustum frustum(camera, cam_from_world, options.margin_px);
-  const Eigen::Vector3d center = cam_from_world.Center();
-  const double min_cosine =
-      options.max_view_angle_rad < std::numbers::pi ? std::cos(options.max_view_angle_rad) : -2.0;
-  const double max_ratio = options.max_distance_ratio;
-  const bool only_near = options.nearest_key_frames > 0;
-
-  // Sorted by index, to look key frames up.
-  thread_local std::vector<uint32_t> near;
-  near.clear();
-  if (only_near) {
-    for (const auto& [cost, k] : impl_->Nearest(cam_from_world, options.nearest_key_frames)) {
-      near.push_back(k);
-    }
-    std::sort(near.begin(), near.end());
+  // The work space lives as long as the thread.
+  thread_local std::vector<uint8_t> counts;
+  thread_local std::vector<uint64_t> marks;  // one bit a line: ascending without sorting
+  counts.assign(impl_->map.key_frames.size(), options.nearest_key_frames == 0 ? 1 : 0);
+  for (const auto& [cost, k] : impl_->Nearest(cam_from_world, options.nearest_key_frames)) {
+    counts[k] = 1;
   }
+  marks.assign((impl_->map.lines.size() + 63) / 64, 0);
 
-  const auto is_seen_alike = [&](uint32_t line) {
-    const Eigen::Vector3d ray = center - map.lines[line].segment_in_world.Midpoint();
-    const double distance = ray.norm();
-    for (const LineSighting& sighting : map.SightingsOf(line)) {
-      const double seen_from = static_cast<double>(sighting.distance_m);
-      if (distance < max_ratio * seen_from && seen_from < max_ratio * distance &&
-          sighting.direction_to_camera.cast<double>().dot(ray) > min_cosine * distance &&
-          (!only_near || std::binary_search(near.begin(), near.end(), sighting.key_frame))) {
-        return true;
-      }
-    }
-    return false;
-  };
+  const ViewTest view(impl_->map, camera, cam_from_world, options, counts);
   impl_->lines.ForEach(
       [&](uint32_t node) {
-        const Box& box = impl_->lines.nodes()[node].box;
-        return box.DistanceTo(center) <= max_ratio * impl_->reach_m[node] &&
-               frustum.MayContain(box);
+        return view.MayShow(impl_->lines.nodes()[node].box, impl_->reach_m[node]);
       },
       [&](uint32_t line) {
-        const MapLine& candidate = map.lines[line];
-        if (candidate.num_observing < options.min_observing || !is_seen_alike(line)) return;
-        const auto visible =
-            ProjectSegment(camera, cam_from_world, candidate.segment_in_world, options.margin_px);
-        if (visible && visible->Length() >= options.min_length_px) out_lines->push_back(line);
+        if (view.Shows(line)) marks[line / 64] |= uint64_t{1} << line % 64;
       });
-  std::sort(out_lines->begin(), out_lines->end());
+  for (size_t word = 0; word < marks.size(); ++word) {
+    for (uint64_t rest = marks[word]; rest != 0; rest &= rest - 1) {
+      out_lines->push_back(static_cast<uint32_t>(64 * word + std::countr_zero(rest)));
+    }
+  }
 }
 
 void MapIndex::NearestKeyFrames(const Rigid3& cam_from_world, uint32_t count,

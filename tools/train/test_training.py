@@ -21,6 +21,7 @@ if torch is not None:
     import export_onnx
     import export_safetensors
     import flat
+    import train
     import weights_file
     from model import PRESETS, Vlse, build, exported_state
     from random_weights import randomise
@@ -253,6 +254,12 @@ class Resume(unittest.TestCase):
             for key in ("model", "average"):
                 for name, value in a[key].items():
                     self.assertTrue(torch.equal(value, b[key][name]), name)
+
+    def test_state_in_the_repository_can_be_continued(self):
+        run = train.Run(train.parse_arguments(["--data", "", "--out", "", "--device", "cpu"]), train.Team())
+        run.restore(os.path.join(HERE, "state", "nano.pt"))
+        self.assertGreater(run.images, 30000)
+        self.assertIsNone(run.decay_start)
 
     def test_decay_phase_leaves_the_long_run_untouched_and_ends(self):
         with tempfile.TemporaryDirectory() as folder:

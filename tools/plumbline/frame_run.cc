@@ -11,6 +11,7 @@
 #include "tools/datasets/timestamp.h"
 #include "tools/datasets/trajectory.h"
 #include "tools/plumbline/console.h"
+#include "tools/plumbline/point_front_end.h"
 
 namespace plumb::tools {
 namespace {
@@ -135,6 +136,12 @@ void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
   command.add_option("--method", options.method, "search, or the paper's local method")
       ->check(CLI::IsMember({"search", "paper"}))
       ->capture_default_str();
+  command
+      .add_option(
+          "--points", options.points,
+          "none, or opencv: also SIFT points, matched with those that the map's key frames hold")
+      ->check(CLI::IsMember({"none", "opencv"}))
+      ->capture_default_str();
 }
 
 Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
@@ -164,6 +171,12 @@ Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
     PrintRemark(options.map + ": was built with " + out_run->map.detector +
                 "'s lines, the queries use " + out_run->detector_name + "'s");
   }
+  out_run->with_points = options.points == "opencv";
+  const auto has_points = [](const KeyFrame& frame) { return !frame.points.empty(); };
+  if (out_run->with_points &&
+      std::none_of(out_run->map.key_frames.begin(), out_run->map.key_frames.end(), has_points)) {
+    return Failure{kExitBadData, options.map + ": holds no points, --points opencv needs them"};
+  }
   SessionOptions& session = out_run->session;
   session.mode = options.mode == "stream" ? SessionMode::kStream : SessionMode::kIndependent;
   session.policy = FramePolicy::kBlock;
@@ -177,15 +190,26 @@ Outcome RunFrames(FrameRun* run, const FrameSink& sink) {
   if (!created) return FailureFrom(created.error());
   Session& session = **created;
   ResultPump pump(*run, &session, sink);
+  PointFrontEnd point_front_end;
   for (size_t i = 0; i < run->frames.size(); ++i) {
     const SequenceFrame& frame = run->frames[i];
-    const Result<cv::Mat> image = ReadColorImage(frame.color_path);
+    const Result<cv::Mat> image =
+        run->images.empty() ? ReadColorImage(frame.color_path) : Result<cv::Mat>(run->images[i]);
     if (!image) return FailureFrom(image.error());
+    std::vector<PointMatch> points;
+    if (run->with_points) {
+      Result<std::vector<PointMatch>> matches =
+          point_front_end.QueryMatches(*image, run->sequence.camera, *run->index,
+                                       run->priors[i].cam_from_world, run->session.refiner.method);
+      if (!matches) return FailFrame(frame, matches.error());
+      points = *std::move(matches);
+    }
     SessionFrame input;
     input.image = ViewOf(*image);
     input.camera = run->sequence.camera;
     input.timestamp_ns = frame.timestamp_ns;
     input.prior = run->priors[i];
+    input.points = points;
     const Result<SubmitOutcome> submitted = session.Submit(input);
     if (!submitted) return FailFrame(frame, submitted.error());
     if (Outcome failed = pump.TakeFinished()) return failed;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <opencv2/core/mat.hpp>
 
 #include "plumb/map/line_map.h"
 #include "plumb/map/map_index.h"
@@ -40,7 +41,8 @@ struct FrameRun {
   std::unique_ptr<LineDetector> detector;
   std::string detector_name, device;  // for reports
   SessionOptions session;
-  bool with_points = false;
+  bool with_points = false;     // SIFT points beside the lines
+  std::vector<cv::Mat> images;  // of the frames, decoded beforehand; empty: read on the way
 };
 
 /// Reads everything that `options` name. Every frame needs an image and a prior.

@@ -17,6 +17,7 @@
 #include "tools/plumbline/detector_choice.h"
 #include "tools/plumbline/json_report.h"
 #include "tools/plumbline/output_directory.h"
+#include "tools/plumbline/point_front_end.h"
 
 namespace plumb::tools {
 namespace {
@@ -24,6 +25,7 @@ namespace {
 struct MapBuildOptions {
   std::string sequence, frames, out;
   DetectorOptions detector;
+  std::string points = "opencv";
   bool json = false;
 };
 
@@ -69,8 +71,11 @@ DepthView ViewOfDepth(const cv::Mat& depth, double depth_scale) {
 /// Detects, refines and lifts the segments of one key frame.
 class KeyFrameReader {
  public:
-  KeyFrameReader(const TumSequence& sequence, LineDetector* detector)
-      : sequence_(sequence), detector_(detector), refiner_(SegmentRefinerOptions{}) {}
+  KeyFrameReader(const TumSequence& sequence, LineDetector* detector, bool with_points)
+      : sequence_(sequence),
+        detector_(detector),
+        with_points_(with_points),
+        refiner_(SegmentRefinerOptions{}) {}
 
   Outcome AddTo(MapBuilder* builder, const SequenceFrame& frame) {
     const Result<cv::Mat> color = ReadColorImage(frame.color_path);
@@ -90,6 +95,12 @@ class KeyFrameReader {
     input.camera = sequence_.camera;
     input.segments = segments;
     input.depth = ViewOfDepth(*depth, sequence_.depth_scale);
+    if (with_points_) {
+      Result<std::vector<MapPoint>> points = point_front_end_.KeyFramePoints(
+          *color, sequence_.camera, *frame.cam_from_world, input.depth);
+      if (!points) return FailureFrom(points.error());
+      input.points = *std::move(points);
+    }
     if (const Status added = builder->AddKeyFrame(std::move(input)); !added) {
       return Failure{kExitBadData, added.error().message};
     }
@@ -99,7 +110,9 @@ class KeyFrameReader {
  private:
   const TumSequence& sequence_;
   LineDetector* detector_;
+  bool with_points_;
   SegmentRefiner refiner_;
+  PointFrontEnd point_front_end_;
 };
 
 Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, double seconds) {
@@ -138,7 +151,7 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   builder_options.detector = detector->Name();
   MapBuilder builder(builder_options);
   {
-    KeyFrameReader reader(sequence, detector.get());
+    KeyFrameReader reader(sequence, detector.get(), options.points == "opencv");
     ProgressBar progress("key frames", frames.size());
     for (const SequenceFrame& frame : frames) {
       if (Outcome failed = reader.AddTo(&builder, frame)) return failed;
@@ -181,6 +194,11 @@ void AddMapBuild(CLI::App& map, PendingRun& pending) {
             .add_option("--out", options.out,
                         "Directory for the map; an earlier map there is replaced")
             ->required();
+        command
+            .add_option("--points", options.points,
+                        "opencv: keep SIFT points of every key frame for replay --points; or none")
+            ->check(CLI::IsMember({"none", "opencv"}))
+            ->capture_default_str();
         command.add_flag("--json", options.json, "Print what was built as JSON");
         command.footer(
             "Examples:\n"

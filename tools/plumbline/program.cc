@@ -32,6 +32,9 @@ void AddCommands(CLI::App& program, PendingRun& pending) {
   CLI::App& eval = AddGroup(program, "eval", "Score detections or refined poses");
   AddEvalLines(eval, pending);
   AddEvalTrajectory(eval, pending);
+  CLI::App& bench = AddGroup(program, "bench", "Measure speed");
+  AddBenchNet(bench, pending);
+  AddBenchFrame(bench, pending);
   AddSynth(program, pending);
   CLI::App& device = AddGroup(program, "device", "Compute devices");
   AddDeviceList(device, pending);

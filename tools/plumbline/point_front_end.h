@@ -1,0 +1,44 @@
+// SIFT points of recorded images, for maps and for queries (--points opencv).
+#pragma once
+
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rigid3.h"
+#include "plumb/map/depth_view.h"
+#include "plumb/map/map_index.h"
+#include "plumb/points/point_features.h"
+#include "plumb/points/point_matcher.h"
+#include "plumb/runtime/pose_refiner.h"
+
+namespace plumb::tools {
+
+/// Owns the work space of extraction and matching. Not thread-safe.
+class PointFrontEnd {
+ public:
+  /// Points of a key frame that have depth.
+  /// @param image  8-bit BGR.
+  Result<std::vector<MapPoint>> KeyFramePoints(const cv::Mat& image, const Camera& camera,
+                                               const Rigid3& cam_from_world,
+                                               const DepthView& depth);
+
+  /// 2D-3D matches of a query image with the key frames near its prior: all of them for the search,
+  /// which drops those that do not fit the lines' pose, else the inliers of PnP-RANSAC.
+  Result<std::vector<PointMatch>> QueryMatches(const cv::Mat& image, const Camera& camera,
+                                               const MapIndex& index,
+                                               const Rigid3& prior_cam_from_world,
+                                               RefineMethod method);
+
+ private:
+  Status Extract(const cv::Mat& image);
+
+  PointExtractor extractor_;
+  PointMatcher matcher_;
+  cv::Mat gray_;
+  ImagePoints points_;
+  std::vector<PointCorrespondence> correspondences_;
+};
+
+}  // namespace plumb::tools

@@ -75,9 +75,10 @@ Outcome RunBenchNet(const BenchNetOptions& options) {
   report["create_ms"] = Rounded(result->create_ms, 3);
   report["first_frame_ms"] = Rounded(result->first_frame_ms, 3);
   if (options.layers) {
+    report["layers"] = Json::array();
     for (const gpu::StageTime& layer : result->layers) {
-      report["layers"].push_back(
-          {{"name", layer.name}, {"ms", Rounded(1e-6 * static_cast<double>(layer.ns), 4)}});
+      const double ms = 1e-6 * static_cast<double>(layer.duration_ns);
+      report["layers"].push_back(Json{{"name", layer.name}, {"ms", Rounded(ms, 4)}});
     }
   }
   return PrintJson(report);

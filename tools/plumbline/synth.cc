@@ -22,7 +22,7 @@ Outcome RunSynth(const SynthOptions& options) {
     return Failure{kExitUsage, valid.error().message};
   }
   OutputDirectory output;
-  if (Outcome failed = output.Open(options.out, "camera.json")) return failed;
+  if (Outcome failed = output.Open(options.out, "lines3d.txt")) return failed;
   {
     ProgressBar progress("synth", static_cast<size_t>(options.sequence.num_frames));
     const Status written = synth::WriteSequence(options.sequence, output.path(),

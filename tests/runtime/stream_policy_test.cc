@@ -120,15 +120,15 @@ TEST(StreamPolicy, SearchStartsAtThePredictionWithTheTrackersUncertainty) {
   EXPECT_EQ(search.rotation_sigma_rad, 0.035);
 }
 
-TEST(StreamPolicy, RepeatedFailuresAlternateBetweenTheTrackerAndThePrediction) {
-  const Rigid3 refined = Pose(0.2, {0, 0, 1}), tracker0 = Pose(0.1, {0, 0.1, 1});
-  StreamState state;
-  Advance({}, tracker0, refined, ResultOf(RefineStatus::kRefined, refined, 0.5), &state);
-  const PosePrior tracker{tracker0, 0.10, 0.035};
-  Advance({}, tracker0, refined, ResultOf(RefineStatus::kLowSupport, tracker0, 0.0), &state);
-  ExpectSamePose(SearchPrior(state, tracker).cam_from_world, tracker0);
-  Advance({}, tracker0, refined, ResultOf(RefineStatus::kLowSupport, tracker0, 0.0), &state);
-  ExpectSamePose(SearchPrior(state, tracker).cam_from_world, refined);
+TEST(StreamPolicy, SuccessIsBetterThanSupport) {
+  const auto result = [](RefineStatus status, double support) {
+    return ResultOf(status, {}, support);
+  };
+  EXPECT_TRUE(IsBetter(result(RefineStatus::kRefined, 0.2), result(RefineStatus::kAmbiguous, 0.4)));
+  EXPECT_FALSE(
+      IsBetter(result(RefineStatus::kLowSupport, 0.4), result(RefineStatus::kKeptPrior, 0.2)));
+  EXPECT_TRUE(IsBetter(result(RefineStatus::kRefined, 0.5), result(RefineStatus::kRefined, 0.4)));
+  EXPECT_FALSE(IsBetter(result(RefineStatus::kRefined, 0.4), result(RefineStatus::kRefined, 0.4)));
 }
 
 TEST(StreamPolicy, FailureKeepsTheCorrection) {

@@ -41,15 +41,19 @@ std::optional<PosePrior> PredictLocally(const StreamState& state, const StreamOp
 }
 
 PosePrior SearchPrior(const StreamState& state, const PosePrior& tracker) {
-  if (!state.last || state.frames_without_success % 2 == 1) return tracker;
   PosePrior prior = tracker;
-  prior.cam_from_world = PredictedPose(*state.last, tracker.cam_from_world);
+  if (state.last) prior.cam_from_world = PredictedPose(*state.last, tracker.cam_from_world);
   return prior;
 }
 
 bool IsLost(const StreamState& state, const StreamOptions& options, const RefineResult& result) {
   return !IsSuccess(result.status) ||
          result.map_support < options.lost_support_share * state.mean_support;
+}
+
+bool IsBetter(const RefineResult& a, const RefineResult& b) {
+  if (IsSuccess(a.status) != IsSuccess(b.status)) return IsSuccess(a.status);
+  return a.map_support > b.map_support;
 }
 
 void Advance(const StreamOptions& options, const Rigid3& tracker_cam_from_world,

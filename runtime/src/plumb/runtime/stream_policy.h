@@ -47,15 +47,16 @@ inline bool IsSuccess(RefineStatus status) {
 std::optional<PosePrior> PredictLocally(const StreamState& state, const StreamOptions& options,
                                         const Rigid3& tracker_cam_from_world);
 
-/// The prior of a search: the predicted pose with the tracker's full uncertainty. From the second
-/// frame without success on, every other search starts from the tracker's own pose instead, since
-/// a host that relocalised leaves the carried correction behind for good.
+/// The prior of a search: the predicted pose with the tracker's full uncertainty.
 PosePrior SearchPrior(const StreamState& state, const PosePrior& tracker);
 
-/// Whether the result of the local refinement must not be trusted: it is no success, or explains
-/// much less of the map than the frames before. The acceptance gate alone cannot tell: after a jump
-/// a wrong local optimum beats the prediction.
+/// Whether a result must not be trusted: it is no success, or explains much less of the map than
+/// the frames before. The acceptance gate alone cannot tell: after a jump a wrong local optimum
+/// beats the prediction.
 bool IsLost(const StreamState& state, const StreamOptions& options, const RefineResult& result);
+
+/// Whether a search's result is to be preferred to another's: successes first, then by support.
+bool IsBetter(const RefineResult& a, const RefineResult& b);
 
 /// Takes the frame's final result into the state.
 /// @param predicted  Pose to carry on when the frame was no success.

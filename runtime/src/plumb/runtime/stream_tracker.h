@@ -9,7 +9,9 @@ namespace plumb {
 
 /// Refines the frames of one stream in their order, with priors that are a tracker's poses: right
 /// from frame to frame, drifting in the long run. A frame is refined locally around the prediction;
-/// when that fails or explains much less than usual, it is searched at once (stream_policy.h).
+/// when that fails or explains much less than usual, it is searched at once, and once more from the
+/// tracker's own pose if that is no better: a host that relocalised leaves the correction behind
+/// (stream_policy.h).
 /// Not thread-safe.
 /// Source: docs/method/association.md, "Stream".
 class StreamTracker {
@@ -32,9 +34,12 @@ class StreamTracker {
   bool searched() const { return searched_; }
 
  private:
+  Status Search(const RefineInput& input, RefineResult* out_result);
+
   PoseRefiner* refiner_;
   StreamOptions options_;
   StreamState state_;
+  RefineResult second_;  // keeps its memory
   bool searched_ = false;
 };
 

@@ -12,6 +12,7 @@
 
 #include "map/rendered_depth.h"
 #include "plumb/geometry/line_projection.h"
+#include "plumb/map/map_check.h"
 
 namespace plumb {
 namespace {
@@ -133,6 +134,8 @@ void ExpectConsistent(const LineMap& map) {
       EXPECT_NEAR(sightings[k].direction_to_camera.norm(), 1.0f, 1e-5f);
     }
   }
+  const Status checked = CheckMap(map);
+  EXPECT_TRUE(checked) << checked.error().message;
   for (const KeyFrame& frame : map.key_frames) {
     for (const LiftedSegment& segment : frame.segments) {
       EXPECT_TRUE(!segment.line || *segment.line < map.lines.size());

@@ -128,6 +128,7 @@ PointAccumulator::Equations PointAccumulator::Accumulate(const Camera& camera,
     out.equations.gradient += weighted * r.error;
   }
   out.num_points = static_cast<int>(residuals_.size());
+  out.scale = scale;
   return out;
 }
 

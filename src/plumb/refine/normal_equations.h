@@ -74,6 +74,7 @@ class PointAccumulator {
   struct Equations {
     NormalEquations equations;
     int num_points = 0;
+    double scale = 1.0;  // by which the whitened squares were divided; 1 without points
   };
   Equations Accumulate(const Camera& camera, const Rigid3& cam_from_world,
                        std::span<const PointObservation> points);

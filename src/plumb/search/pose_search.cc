@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 namespace plumb {
@@ -21,7 +22,10 @@ struct Level {
   int num_steps;
 };
 constexpr Level kLevels[] = {{30.0, 3}, {20.0, 3}, {12.0, 3}, {6.0, 3}, {3.0, 2}};
+constexpr size_t kLateLevel = 2;   // where hypotheses enter that skip the widest sigmas
 constexpr size_t kMinAligned = 8;  // never fewer at a level
+// Aligned poses nearer than this are one.
+constexpr float kDuplicatePositionM = 0.01f, kDuplicateRotationRad = 0.005f;
 constexpr double kFinalSigmaPx = 3.0;
 constexpr double kPriorScale = 1.5;  // of the alignment's prior factor over the prior's own sigma
 
@@ -135,7 +139,10 @@ void PoseSearch::Rank(double sigma_px, const DirectionField& field) {
 }
 
 void PoseSearch::Align(const SearchRegion& region) {
-  for (const Level& level : kLevels) {
+  late_ = hypotheses_;
+  for (size_t i = 0; i < std::size(kLevels); ++i) {
+    const Level& level = kLevels[i];
+    if (i == kLateLevel) hypotheses_.insert(hypotheses_.end(), late_.begin(), late_.end());
     const FieldAlignmentOptions options{
         .sigma_px = level.sigma_px,
         .num_steps = level.num_steps,
@@ -146,8 +153,26 @@ void PoseSearch::Align(const SearchRegion& region) {
     }
     if (hypotheses_.size() <= kMinAligned) continue;
     Rank(level.sigma_px, fine_field_);
-    hypotheses_.resize(std::max(kMinAligned, hypotheses_.size() / 2));
+    const size_t kept = std::max(kMinAligned, hypotheses_.size() / 2);
+    DropDuplicates();
+    if (hypotheses_.size() > kept) hypotheses_.resize(kept);
   }
+}
+
+void PoseSearch::DropDuplicates() {
+  size_t kept = 0;
+  for (size_t i = 0; i < hypotheses_.size(); ++i) {
+    const RelativePose& pose = hypotheses_[i].pose;
+    bool is_duplicate = false;
+    for (size_t j = 0; j < kept && !is_duplicate; ++j) {
+      const RelativePose& other = hypotheses_[j].pose;
+      // For small turns the difference of the matrices is sqrt(2) times the angle.
+      is_duplicate = (pose.translation - other.translation).norm() < kDuplicatePositionM &&
+                     (pose.rotation - other.rotation).norm() < 1.414f * kDuplicateRotationRad;
+    }
+    if (!is_duplicate) hypotheses_[kept++] = hypotheses_[i];
+  }
+  hypotheses_.resize(kept);
 }
 
 void PoseSearch::CollectSurvivors(const SearchRegion& region, size_t max_survivors) {

@@ -28,7 +28,7 @@ struct SearchRegion {
 
 struct PoseSearchOptions {
   uint32_t num_hypotheses = 1500;
-  size_t num_aligned = 64;   // best hypotheses that are aligned, beside the prior itself
+  size_t num_aligned = 32;   // best hypotheses that are aligned, beside the prior itself
   size_t num_survivors = 4;  // distinct poses returned at most
 };
 
@@ -38,10 +38,11 @@ struct FoundPose {
 };
 
 /// Hypotheses from the prior (half of them with the rotation found first), scored on a direction
-/// field of quarter resolution; the best are aligned on one of half resolution while sigma shrinks
-/// from 30 to 3 px and the worse half is dropped at each level. Images wider than 960 px are
-/// searched as if 640 px wide. Equal inputs and seeds give equal results. Owns its work space, does
-/// not allocate once warm; not thread-safe. Source: docs/method/association.md.
+/// field of quarter resolution. The best are aligned on one of half resolution while sigma shrinks
+/// from 30 to 3 px, and once more from 12 px only: at 30 px most starts run into one optimum, which
+/// need not be the right one. At each level duplicates and the worse half are dropped. Images wider
+/// than 960 px are searched as if 640 px wide. Equal inputs and seeds give equal results. Owns its
+/// work space, does not allocate once warm; not thread-safe. Source: docs/method/association.md.
 class PoseSearch {
  public:
   /// @return up to num_survivors poses, best first, any two more than 2 cm or 0.01 rad apart; valid
@@ -62,6 +63,7 @@ class PoseSearch {
                       const PoseSearchOptions& options, uint64_t seed);
   void Rank(double sigma_px, const DirectionField& field);
   void Align(const SearchRegion& region);
+  void DropDuplicates();
   void CollectSurvivors(const SearchRegion& region, size_t max_survivors);
 
   Camera camera_;                   // of the searched image
@@ -75,7 +77,7 @@ class PoseSearch {
   std::vector<Eigen::Matrix3f> rotations_;
   FieldScorer scorer_;
   FieldAligner aligner_;
-  std::vector<Hypothesis> hypotheses_;
+  std::vector<Hypothesis> hypotheses_, late_;  // late_ are aligned from the smaller sigma on
   std::vector<FoundPose> found_;
 };
 

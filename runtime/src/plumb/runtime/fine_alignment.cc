@@ -96,6 +96,7 @@ FineAlignment FineAligner::Align(const Camera& camera, const Rigid3& start,
       equations.Add(point_terms.equations);
       out.point_information = point_terms.equations.information;
       out.num_points = point_terms.num_points;
+      out.point_scale = point_terms.scale;
     }
     const auto delta = SolveStep(equations, kMaxRotationStep);
     if (!delta) break;

@@ -45,6 +45,7 @@ struct FineAlignment {
   double residual_scale = 1.0;                    // of the lines (LineEquations)
   size_t num_pairs = 0;                           // of the last step
   int num_points = 0;
+  double point_scale = 1.0;  // of the points' whitened squares (PointAccumulator)
 };
 
 /// Owns its work space and does not allocate once warm; not thread-safe.

@@ -111,8 +111,7 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
       .prior = MeasureSupport(input.camera, prior),
       .num_pairs = observations_.size(),
       .num_observed_directions = CountObservedDirections(
-          terms.equations.information / (std::max(terms.residual_scale, 1.0) * factor),
-          input.prior)};
+          terms.equations.information / std::max(terms.residual_scale, 1.0), input.prior)};
   result->status =
       Decide(evidence, {.min_map_support = options_.min_map_support, .min_gain = kMinGain});
   result->map_support = evidence.refined.map_share;

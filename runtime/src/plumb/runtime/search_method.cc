@@ -180,16 +180,15 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
     }
   }
   const double value = best.support.Value();
-  const double common_scale =
-      std::max(best.alignment.residual_scale, 1.0) * index_.map().covariance_factor;
   attempt.alignment = best.alignment;
-  attempt.evidence = {.refined = best.support,
-                      .prior = MeasureSupport(input.camera, prior.cam_from_world),
-                      .runner_up_ratio = value > 0.0 ? runner_up / value : 0.0,
-                      .is_near_prior = IsPlausible(best.alignment.cam_from_world, input.prior),
-                      .num_pairs = best.alignment.num_pairs,
-                      .num_observed_directions = CountObservedDirections(
-                          best.alignment.line_information / common_scale, prior)};
+  attempt.evidence = {
+      .refined = best.support,
+      .prior = MeasureSupport(input.camera, prior.cam_from_world),
+      .runner_up_ratio = value > 0.0 ? runner_up / value : 0.0,
+      .is_near_prior = IsPlausible(best.alignment.cam_from_world, input.prior),
+      .num_pairs = best.alignment.num_pairs,
+      .num_observed_directions = CountObservedDirections(
+          best.alignment.line_information / std::max(best.alignment.residual_scale, 1.0), prior)};
   attempt.status = Decide(attempt.evidence,
                           {.min_map_support = gate.map_support_factor * options_.min_map_support,
                            .min_gain = input.search ? kSearchGain : kStreamGain,

@@ -301,6 +301,42 @@ static void test_points(const fixture* f, const plumb_map* map) {
   plumb_session_destroy(session);
 }
 
+/* Whatever the settings: results come, in order, and a black image returns the prior. */
+static void test_every_mode_and_method(const fixture* f, const plumb_map* map) {
+  int combination;
+  uint8_t* black = calloc((size_t)f->width_px, f->height_px);
+  if (black == NULL) return;
+  for (combination = 0; combination < 4; ++combination) {
+    plumb_session_options options = make_options(map);
+    plumb_session* session;
+    int i, k;
+    options.mode = combination % 2 == 0 ? PLUMB_MODE_INDEPENDENT : PLUMB_MODE_STREAM;
+    options.method = combination < 2 ? PLUMB_METHOD_SEARCH : PLUMB_METHOD_PAPER;
+    session = make_session(&options);
+    for (i = 0; i < NUM_FRAMES; ++i) {
+      plumb_frame_result result = empty_result();
+      plumb_frame frame = make_frame(f, i);
+      if (i == NUM_FRAMES - 1) frame.planes[0] = black;
+      EXPECT(plumb_session_submit_frame(session, &frame) == PLUMB_OK);
+      EXPECT(plumb_session_wait_result(session, 60 * SECOND_NS, &result) == PLUMB_OK);
+      EXPECT(result.outcome == PLUMB_OUTCOME_PROCESSED);
+      EXPECT(result.status != PLUMB_STATUS_NONE);
+      EXPECT(result.frame_index == (uint64_t)i);
+      for (k = 0; k < 3; ++k) EXPECT(isfinite(result.t_m[k]));
+      if (i < NUM_FRAMES - 1) continue;
+      EXPECT(result.status == PLUMB_STATUS_LOW_SUPPORT);
+      EXPECT(result.num_segments == 0 && result.num_matches == 0);
+      if (options.mode == PLUMB_MODE_INDEPENDENT) {
+        for (k = 0; k < 3; ++k) EXPECT(fabs(result.t_m[k] - frame.prior_t_m[k]) < 1e-12);
+      } else if (options.method == PLUMB_METHOD_SEARCH) { /* the correction is carried on */
+        EXPECT(translation_error(f, i, result.t_m) < 0.02);
+      }
+    }
+    plumb_session_destroy(session);
+  }
+  free(black);
+}
+
 static void count_result(const plumb_frame_result* result, void* user) {
   int* count = user;
   if (result->struct_size == sizeof *result && result->outcome == PLUMB_OUTCOME_PROCESSED) {
@@ -487,6 +523,7 @@ int main(int argc, char** argv) {
   test_pose_conventions(&f, map);
   test_covariance_as_prior(&f, map);
   test_points(&f, map);
+  test_every_mode_and_method(&f, map);
   test_callbacks(&f, map);
   test_destroy_with_frames_in_flight(&f, map);
   test_broken_frames(&f, map);

@@ -33,8 +33,9 @@ inline constexpr size_t kMinCalibrationFrames = 5;
 /// deviation) and compares the errors with the reported covariances. Errors of map and key-frame
 /// poses are common to all lines of a frame: its residuals do not show them, left-out frames do.
 /// The factor is the median of e^T C^-1 e over that of a chi-square variable with 6 degrees of
-/// freedom, so that a few wrong poses do not count. Leave out every fifth key frame, calibrate, and
-/// give the factor to the map of all key frames. Deterministic: the priors follow options.seed.
+/// freedom, so that a few wrong poses do not count. The factor also enters the observability check:
+/// a map with a large one has more DEGENERATE frames. Leave out every fifth key frame, calibrate,
+/// and give the factor to the map of all key frames. Deterministic: the priors follow options.seed.
 ///
 /// @param map  Built without the frames; its own factor is taken into account.
 /// @return kInvalidArgument as PoseRefiner::Create() and Refine() do.

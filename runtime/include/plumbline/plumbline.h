@@ -1,19 +1,25 @@
-/* C interface of Plumbline: camera frames with coarse poses in, refined poses out. ABI version 0, C99.
+/* C interface of Plumbline: camera frames with coarse poses in, refined poses out. C99, version 0.
  *
- * Ownership   Handles come from plumb_*_open or plumb_*_create and go to plumb_*_destroy, which takes
- *             NULL. Pointers passed in are borrowed for the duration of the call unless stated.
- * Results     0 success, > 0 success with a remark, < 0 error; plumb_last_error() has the text.
- * Structs     Start with struct_size = sizeof of the caller. Zero the rest, then set what you need:
- *             zero means the default unless stated. New members are only appended; a size or a member
- *             that this library does not know is refused, never ignored.
- * Threads     Functions of different handles may be called at once. Of one session: one thread may
- *             submit while others poll, wait and read statistics; nothing may run beside its destroy.
- * Callbacks   Come from any thread, never with a lock of the library held. They must not unwind
- *             (no exceptions, no longjmp) and must not destroy the session that calls them.
- * Promises    The library does not throw, abort, print, or change signal handlers, locale or
- *             environment.
- * Conventions Metres, radians, nanoseconds, pixels; the centre of the first pixel is (0, 0);
- *             x_in_b = b_from_a * x_in_a; quaternions x, y, z, w.
+ * Ownership: handles come from plumb_*_open or plumb_*_create and go to plumb_*_destroy, which
+ * takes NULL. Pointers passed in are borrowed for the duration of the call unless stated.
+ *
+ * Results: 0 success, > 0 success with a remark, < 0 error; plumb_last_error() has the text.
+ *
+ * Structs start with struct_size = sizeof of the caller. Zero the rest, then set what you need:
+ * zero means the default unless stated. Members are only ever appended; a size or an input that
+ * this library does not know is refused, never ignored.
+ *
+ * Threads: functions of different handles may be called at once. Of one session: one thread may
+ * submit while others poll, wait and read statistics; nothing may run beside its destroy.
+ *
+ * Callbacks come from any thread, never with a lock of the library held. They must not unwind (no
+ * exceptions, no longjmp) and must not destroy the session that calls them.
+ *
+ * Promises: the library does not throw, abort or print, nor change signal handlers, locale or
+ * environment.
+ *
+ * Conventions: metres, radians, nanoseconds, pixels; the centre of the first pixel is (0, 0);
+ * x_in_b = b_from_a * x_in_a; quaternions x, y, z, w.
  */
 #ifndef PLUMBLINE_PLUMBLINE_H_
 #define PLUMBLINE_PLUMBLINE_H_
@@ -39,7 +45,8 @@ extern "C" {
 #define PLUMB_VERSION_PATCH 0
 #define PLUMB_MAKE_VERSION(major, minor, patch) \
   (((uint32_t)(major) << 24) | ((uint32_t)(minor) << 12) | (uint32_t)(patch))
-#define PLUMB_VERSION PLUMB_MAKE_VERSION(PLUMB_VERSION_MAJOR, PLUMB_VERSION_MINOR, PLUMB_VERSION_PATCH)
+#define PLUMB_VERSION \
+  PLUMB_MAKE_VERSION(PLUMB_VERSION_MAJOR, PLUMB_VERSION_MINOR, PLUMB_VERSION_PATCH)
 
 /* Version of the library at run time, as PLUMB_MAKE_VERSION packs it. */
 PLUMB_API uint32_t plumb_version(void);
@@ -65,8 +72,8 @@ enum {
 /* "PLUMB_OK", ...; "PLUMB_RESULT_UNKNOWN" for other values. Static. */
 PLUMB_API const char* plumb_result_string(plumb_result result);
 
-/* One sentence on the last call of this thread that returned an error; "" when there was none. Valid
- * until the next plumb_* call of this thread. Never NULL. */
+/* One sentence on the last call of this thread that returned an error; "" when there was none.
+ * Valid until the next plumb_* call of this thread. Never NULL. */
 PLUMB_API const char* plumb_last_error(void);
 
 /* --- Messages --------------------------------------------------------------------------------- */
@@ -76,8 +83,8 @@ enum { PLUMB_LOG_DEBUG = 0, PLUMB_LOG_INFO = 1, PLUMB_LOG_WARNING = 2, PLUMB_LOG
 /* `message` is one sentence without a line end, valid during the call. */
 typedef void (*plumb_log_callback)(int32_t level, const char* message, void* user);
 
-/* Sends the messages of all sessions, `min_level` and above, to `callback`. NULL drops them, which is
- * the default. Another thread may still be in the former callback on return. */
+/* Sends the messages of all sessions, `min_level` and above, to `callback`. NULL drops them, which
+ * is the default. Another thread may still be in the former callback on return. */
 PLUMB_API plumb_result plumb_log_set_callback(plumb_log_callback callback, void* user,
                                               int32_t min_level);
 
@@ -94,8 +101,8 @@ typedef struct plumb_map_info {
   char detector[64];            /* that found the map's segments; a session should use the same */
 } plumb_map_info;
 
-/* Reads the map directory `path` (UTF-8), as written by `plumbline map build`, and checks all of it.
- * NOT_FOUND, CORRUPT_DATA, UNSUPPORTED (newer format). */
+/* Reads the map directory `path` (UTF-8), as written by `plumbline map build`, and checks all of
+ * it. NOT_FOUND, CORRUPT_DATA, UNSUPPORTED (newer format). */
 PLUMB_API plumb_result plumb_map_open(const char* path, plumb_map** out_map);
 
 PLUMB_API plumb_result plumb_map_get_info(const plumb_map* map, plumb_map_info* out_info);
@@ -157,13 +164,13 @@ typedef void (*plumb_result_callback)(const struct plumb_frame_result* result, v
 
 typedef struct plumb_session_options {
   uint32_t struct_size;
-  int32_t mode;   /* PLUMB_MODE_* */
-  int32_t method; /* PLUMB_METHOD_* */
-  int32_t policy; /* PLUMB_POLICY_* */
+  int32_t mode;         /* PLUMB_MODE_* */
+  int32_t method;       /* PLUMB_METHOD_* */
+  int32_t policy;       /* PLUMB_POLICY_* */
   const plumb_map* map; /* required; may be destroyed once the session is created */
-  /* Line detector: "lsd", a built-in network ("nano"), or the path of a .safetensors file; NULL: the
-   * one that made the map. With model_data set, `model` must be NULL: the file is then read from
-   * memory, and the data may be freed once the session is created. */
+  /* Line detector: "lsd", a built-in network ("nano"), or the path of a .safetensors file; NULL:
+   * the one that made the map. With model_data set, `model` must be NULL: the file is then read
+   * from memory, and the data may be freed once the session is created. */
   const char* model;
   const void* model_data;
   uint64_t model_size_bytes;
@@ -173,9 +180,9 @@ typedef struct plumb_session_options {
   const plumb_vulkan_host* vulkan_host; /* NULL: the library opens a device of its own */
   uint32_t num_hypotheses;              /* of the search, 1..2048; 0: 1500 */
   uint32_t max_segments;                /* best detected segments to use, 1..4096; 0: 400 */
-  double min_map_support; /* least share of the visible map to accept a pose, (0, 1); 0: 0.12 */
-  uint64_t seed;          /* equal inputs and seeds give equal results */
-  int64_t deadline_ns;    /* frames whose lines are found later are not refined; 0: none */
+  double min_map_support;    /* least share of the visible map to accept a pose, (0, 1); 0: 0.12 */
+  uint64_t seed;             /* equal inputs and seeds give equal results */
+  int64_t deadline_ns;       /* frames whose lines are found later are not refined; 0: none */
   int64_t submit_timeout_ns; /* longest wait of a blocking submit; 0: no limit */
   uint32_t result_capacity;  /* results kept until polled, 1..1024; 0: 16. When full: the oldest is
                                 discarded (NEWEST), or work stops until one is polled (BLOCK) */
@@ -189,13 +196,14 @@ typedef struct plumb_session_options {
 PLUMB_API plumb_result plumb_session_create(const plumb_session_options* options,
                                             plumb_session** out_session);
 
-/* Waits for the step that the session is in (milliseconds), not for the frames inside: those give no
- * result. Borrowed images are released. */
+/* Waits for the step that the session is in (milliseconds), not for the frames inside: those give
+ * no result. Borrowed images are released. */
 PLUMB_API void plumb_session_destroy(plumb_session* session);
 
 /* --- Frames ----------------------------------------------------------------------------------- */
 
-enum { /* 8 bit; the chroma of NV12 (U, V), NV21 (V, U) and I420 (planes Y, U, V) is subsampled 2 x 2 */
+/* 8 bit; the chroma of NV12 (U, V), NV21 (V, U) and I420 (planes Y, U, V) is subsampled 2 x 2. */
+enum {
   PLUMB_FORMAT_GRAY8 = 1,
   PLUMB_FORMAT_RGB8 = 2,
   PLUMB_FORMAT_BGR8 = 3,
@@ -204,8 +212,8 @@ enum { /* 8 bit; the chroma of NV12 (U, V), NV21 (V, U) and I420 (planes Y, U, V
   PLUMB_FORMAT_I420 = 6
 };
 
-/* What the pose numbers of a frame and of its result mean. CV: camera axes x right, y down, z forward;
- * GL: x right, y up, z backward. There is no default. */
+/* What the pose numbers of a frame and of its result mean. CV: camera axes x right, y down, z
+ * forward; GL: x right, y up, z backward. There is no default. */
 enum {
   PLUMB_POSE_CV_CAM_FROM_WORLD = 1,
   PLUMB_POSE_CV_WORLD_FROM_CAM = 2,
@@ -226,19 +234,20 @@ typedef struct plumb_frame {
   uint32_t width_px, height_px;
   const uint8_t* planes[3];
   int64_t row_stride_bytes[3];
-  double fx, fy, cx, cy; /* pinhole, undistorted [px] */
-  int64_t timestamp_ns;  /* of the caller's clock; strictly increasing within a session */
-  uint64_t user_tag;     /* comes back in the result */
+  double fx, fy, cx, cy;     /* pinhole, undistorted [px] */
+  int64_t timestamp_ns;      /* of the caller's clock; strictly increasing within a session */
+  uint64_t user_tag;         /* comes back in the result */
   int32_t pose_convention;   /* PLUMB_POSE_*; required */
   int32_t prior_uncertainty; /* PLUMB_UNCERTAINTY_* */
   double prior_q_xyzw[4];    /* unit length to 1e-3 */
   double prior_t_m[3];
-  /* One standard deviation of the norm of the whole error vector; 0: 0.10 m and 0.0349 rad. In stream
-   * mode: of the tracker's drift. */
+  /* One standard deviation of the norm of the whole error vector; 0: 0.10 m and 0.0349 rad. In
+   * stream mode: of the tracker's drift. */
   double prior_position_sigma_m, prior_rotation_sigma_rad;
-  double prior_covariance[36]; /* symmetric, positive semi-definite; its size is what counts today */
+  double prior_covariance[36]; /* positive semi-definite; only its size counts today */
   /* Optional 2D-3D correspondences: x, y [px]; x, y, z in the world [m]; and, or NULL, one standard
-   * deviation of each point along the ray of the camera that made it, as a vector in the world [m]. */
+   * deviation of each point along the ray of the camera that made it, as a vector in the world [m].
+   */
   const double* points_px;
   const double* points_in_world_m;
   const double* points_deviation_m;
@@ -251,7 +260,8 @@ typedef struct plumb_frame {
 } plumb_frame;
 
 /* Every accepted frame gives exactly one result, in the order of submission.
- * OK, FRAME_REPLACED, TIMEOUT (not accepted); INVALID_ARGUMENT names the broken value; DEVICE_LOST. */
+ * OK, FRAME_REPLACED, TIMEOUT (not accepted); INVALID_ARGUMENT names the broken value; DEVICE_LOST.
+ */
 PLUMB_API plumb_result plumb_session_submit_frame(plumb_session* session, const plumb_frame* frame);
 
 /* --- Frame results ---------------------------------------------------------------------------- */
@@ -263,11 +273,13 @@ enum {
   PLUMB_OUTCOME_FAILED = 3   /* `error` and `error_message` say why */
 };
 
-enum {                         /* of a processed frame; only REFINED changes the pose */
-  PLUMB_STATUS_NONE = 0,       /* the frame was not processed */
+/* Of a processed frame; only REFINED changes the pose. */
+enum {
+  PLUMB_STATUS_NONE = 0, /* the frame was not processed */
   PLUMB_STATUS_REFINED = 1,
   PLUMB_STATUS_KEPT_PRIOR = 2, /* nothing explains the lines better than the prior does */
-  PLUMB_STATUS_AMBIGUOUS = 3,  /* a clearly different pose explains the lines as well */
+  PLUMB_STATUS_AMBIGUOUS = 3,  /* a clearly different pose explains the lines as well, or the best
+                                  one contradicts the prior */
   PLUMB_STATUS_DEGENERATE = 4, /* the lines leave a direction of the pose unobserved */
   PLUMB_STATUS_LOW_SUPPORT = 5 /* too few lines, or too little of the visible map was found */
 };
@@ -277,19 +289,21 @@ PLUMB_API const char* plumb_status_string(int32_t status);
 
 typedef struct plumb_frame_result {
   uint32_t struct_size;
-  int32_t outcome;    /* PLUMB_OUTCOME_* */
-  int32_t status;     /* PLUMB_STATUS_* */
-  plumb_result error; /* of PLUMB_OUTCOME_FAILED */
+  int32_t outcome;      /* PLUMB_OUTCOME_* */
+  int32_t status;       /* PLUMB_STATUS_* */
+  plumb_result error;   /* of PLUMB_OUTCOME_FAILED */
   uint64_t frame_index; /* counts accepted frames from 0 */
   uint64_t user_tag;
   int64_t timestamp_ns;
   int32_t pose_convention; /* of the frame's prior */
   uint32_t was_searched;   /* 1: the prior's whole uncertainty was searched */
-  double q_xyzw[4]; /* the best pose there is: refined, else the prior; in stream mode, else the */
-  double t_m[3];    /* tracker's pose with the correction carried on */
-  double covariance[36];     /* see plumb_frame */
-  double map_support;        /* share of the visible map that was found, 0..1 */
-  double runner_up_ratio;    /* support of the best clearly different pose over this one's */
+  /* The best pose there is: refined, else the prior; in stream mode, else the tracker's pose with
+   * the correction carried on. */
+  double q_xyzw[4];
+  double t_m[3];
+  double covariance[36];            /* see plumb_frame */
+  double map_support;               /* share of the visible map that was found, 0..1 */
+  double runner_up_ratio;           /* support of the best clearly different pose over this one's */
   uint32_t num_observed_directions; /* of the pose's six, by lines and points */
   uint32_t num_segments, num_matches, num_points_used;
   int64_t wait_ns, detect_ns, ridge_ns, search_ns, refine_ns; /* stages */

@@ -11,7 +11,8 @@
 
 namespace plumb::tools {
 
-Result<std::vector<AnnotatedImage>> ReadLineAnnotations(const std::string& directory) {
+Result<std::vector<AnnotatedImage>> ReadLineAnnotations(const std::string& directory,
+                                                        const std::string& image_folder) {
   const std::string path = directory + "/annotations.json";
   const Result<std::string> text = ReadFile(path);
   if (!text) return text.error();
@@ -30,7 +31,7 @@ Result<std::vector<AnnotatedImage>> ReadLineAnnotations(const std::string& direc
       return corrupt("a \"filename\"");
     }
     AnnotatedImage image;
-    image.path = directory + "/images/" + entry["filename"].get<std::string>();
+    image.path = directory + "/" + image_folder + "/" + entry["filename"].get<std::string>();
     for (const auto& [key, value] :
          {std::pair("width", &image.width_px), std::pair("height", &image.height_px)}) {
       if (!entry.contains(key) || !entry[key].is_number_integer() || entry[key] < 1 ||

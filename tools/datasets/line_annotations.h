@@ -18,6 +18,7 @@ struct AnnotatedImage {
 /// Reads DIR/annotations.json: [{"filename", "width", "height", "lines": [[x1, y1, x2, y2], ..]},
 /// ..]; the images lie in DIR/images.
 /// @return kNotFound; kCorruptData naming the entry and member.
-Result<std::vector<AnnotatedImage>> ReadLineAnnotations(const std::string& directory);
+Result<std::vector<AnnotatedImage>> ReadLineAnnotations(const std::string& directory,
+                                                        const std::string& image_folder = "images");
 
 }  // namespace plumb::tools

@@ -19,12 +19,13 @@ namespace {
 
 struct EvalLinesOptions {
   DetectorOptions detector;
-  std::string data;
+  std::string data, images = "images";
   bool json = false;
 };
 
 Outcome RunEvalLines(const EvalLinesOptions& options) {
-  const Result<std::vector<AnnotatedImage>> annotated = ReadLineAnnotations(options.data);
+  const Result<std::vector<AnnotatedImage>> annotated =
+      ReadLineAnnotations(options.data, options.images);
   if (!annotated) return FailureFrom(annotated.error());
   std::unique_ptr<LineDetector> detector;
   if (Outcome failed = CreateDetector(options.detector, &detector)) return failed;
@@ -85,6 +86,8 @@ void AddEvalLines(CLI::App& eval, PendingRun& pending) {
                 "--data", options.data,
                 "Directory with images/ and annotations.json [{filename, width, height, lines}]")
             ->required();
+        command.add_option("--images", options.images, "Folder of the images below it")
+            ->capture_default_str();
         command.add_flag("--json", options.json,
                          "Print {sAP5, sAP10, sAP15, images, ms_per_image}; the time is the median "
                          "of detection alone");

@@ -1,0 +1,40 @@
+// Runs the built program as a user does.
+#pragma once
+
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <sys/wait.h>
+
+#include "tests/tools/temporary_directory.h"
+
+namespace plumb::testing {
+
+struct ProgramRun {
+  int exit_code = -1;  // -1: killed by a signal
+  std::string out, err;
+};
+
+inline std::string ReadAll(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  if (file.peek() != std::ifstream::traits_type::eof()) bytes << file.rdbuf();
+  return bytes.str();
+}
+
+/// `arguments` as typed in a shell; paths must not need quoting.
+inline ProgramRun RunPlumbline(const std::string& arguments) {
+  const TemporaryDirectory streams;
+  const std::string command = std::string(PLUMBLINE_PROGRAM) + " " + arguments + " >" +
+                              (streams / "out") + " 2>" + (streams / "err") + " </dev/null";
+  const int status = std::system(command.c_str());
+  ProgramRun run;
+  if (WIFEXITED(status)) run.exit_code = WEXITSTATUS(status);
+  run.out = ReadAll(streams / "out");
+  run.err = ReadAll(streams / "err");
+  return run;
+}
+
+}  // namespace plumb::testing

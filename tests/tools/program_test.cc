@@ -1,0 +1,180 @@
+// The program from the command line: what it prints, which exit codes it has, how it fails.
+#include <cmath>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "tests/tools/program_run.h"
+
+namespace plumb::tools {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::ProgramRun;
+using testing::RunPlumbline;
+using testing::TemporaryDirectory;
+
+/// An image with one bright rectangle, (40, 30) to (120, 90).
+std::string WriteRectangle(const TemporaryDirectory& dir, const std::string& name) {
+  cv::Mat image(120, 160, CV_8UC3, cv::Scalar(30, 30, 30));
+  cv::rectangle(image, cv::Rect(40, 30, 80, 60), cv::Scalar(220, 220, 220), cv::FILLED);
+  cv::imwrite(dir / name, image);
+  return dir / name;
+}
+
+TEST(Program, WithoutACommandIsWrongUsage) {
+  const ProgramRun run = RunPlumbline("");
+  EXPECT_EQ(run.exit_code, 64);
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(run.err, HasSubstr("subcommand"));
+}
+
+TEST(Program, EveryCommandHasHelp) {
+  for (const char* command : {"", "detect", "map", "map build", "map info", "map export", "replay",
+                              "eval", "eval lines", "eval trajectory", "bench", "bench net",
+                              "bench frame", "synth", "device", "device list", "version"}) {
+    const ProgramRun run = RunPlumbline(std::string(command) + " --help");
+    EXPECT_EQ(run.exit_code, 0) << command;
+    EXPECT_THAT(run.out, HasSubstr("Usage:")) << command;
+    EXPECT_THAT(run.err, IsEmpty()) << command;
+  }
+}
+
+TEST(Program, WrongOptionsAreWrongUsage) {
+  for (const char* arguments :
+       {"detect", "detect --no-such-option", "frobnicate", "map build --sequence x",
+        "replay --mode sideways", "bench net --size 100", "bench net --preset huge",
+        "bench net --frames 0", "map export m --out lines.txt"}) {
+    const ProgramRun run = RunPlumbline(arguments);
+    EXPECT_EQ(run.exit_code, 64) << arguments << ": " << run.err;
+    EXPECT_THAT(run.out, IsEmpty()) << arguments;
+    EXPECT_THAT(run.err, HasSubstr("plumbline: ")) << arguments;
+  }
+}
+
+TEST(Program, VersionIsJson) {
+  const ProgramRun run = RunPlumbline("version --json");
+  ASSERT_EQ(run.exit_code, 0);
+  EXPECT_EQ(json::parse(run.out)["schema"], "plumb.version/1");
+}
+
+TEST(Program, DetectPrintsOneJsonDocument) {
+  const TemporaryDirectory dir;
+  const std::string a = WriteRectangle(dir, "a.png"), b = WriteRectangle(dir, "b.png");
+  const ProgramRun run = RunPlumbline("detect " + a + " " + b + " --model lsd --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  ASSERT_EQ(report.size(), 2u);
+  EXPECT_EQ(report[0]["file"], a);
+  EXPECT_EQ(report[1]["file"], b);
+  EXPECT_EQ(report[0]["width"], 160);
+  EXPECT_EQ(report[0]["height"], 120);
+  ASSERT_GE(report[0]["lines"].size(), 4u);
+  EXPECT_EQ(report[0]["lines"].size(), report[0]["scores"].size());
+  EXPECT_EQ(report[0]["lines"][0].size(), 4u);
+  EXPECT_EQ(report[0]["lines"], report[1]["lines"]);
+}
+
+TEST(Program, RefinedSegmentsLieOnTheEdges) {
+  const TemporaryDirectory dir;
+  const ProgramRun run =
+      RunPlumbline("detect " + WriteRectangle(dir, "a.png") + " --model lsd --refined --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json lines = json::parse(run.out)[0]["lines"];
+  ASSERT_GE(lines.size(), 4u);
+  for (const json& line : lines) {
+    // The rectangle's edges lie between pixels: x 39.5 and 119.5, y 29.5 and 89.5.
+    const auto on = [](double u, double v, double place) {
+      return std::abs(u - place) < 0.3 && std::abs(v - place) < 0.3;
+    };
+    EXPECT_TRUE(on(line[0], line[2], 39.5) || on(line[0], line[2], 119.5) ||
+                on(line[1], line[3], 29.5) || on(line[1], line[3], 89.5))
+        << line;
+  }
+}
+
+TEST(Program, DetectNamesTheImageThatFails) {
+  const TemporaryDirectory dir;
+  const ProgramRun missing = RunPlumbline("detect " + (dir / "no.png") + " --model lsd --json");
+  EXPECT_EQ(missing.exit_code, 66);
+  EXPECT_THAT(missing.out, IsEmpty());
+  EXPECT_THAT(missing.err, HasSubstr("no.png"));
+  const std::string good = WriteRectangle(dir, "a.png");
+  const std::string broken = dir.Write("broken.png", testing::ReadAll(good).substr(0, 40));
+  const ProgramRun corrupt = RunPlumbline("detect " + good + " " + broken + " --model lsd --json");
+  EXPECT_EQ(corrupt.exit_code, 65);
+  EXPECT_THAT(corrupt.out, IsEmpty());
+  EXPECT_THAT(corrupt.err, HasSubstr("broken.png"));
+}
+
+TEST(Program, EvalLinesScoresAnAnnotatedFolder) {
+  const TemporaryDirectory dir;
+  dir.Write("images/.keep", "");
+  WriteRectangle(dir, "images/a.png");
+  dir.Write("annotations.json",
+            R"([{"filename": "a.png", "width": 160, "height": 120, "lines":
+                [[39.5, 29.5, 119.5, 29.5], [119.5, 29.5, 119.5, 89.5],
+                 [119.5, 89.5, 39.5, 89.5], [39.5, 89.5, 39.5, 29.5]]}])");
+  const ProgramRun run = RunPlumbline("eval lines --model lsd --data " + dir.path() + " --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_EQ(report["images"], 1);
+  EXPECT_DOUBLE_EQ(report["sAP10"].get<double>(), 100.0);
+  EXPECT_GT(report["ms_per_image"].get<double>(), 0.0);
+  dir.Write("annotations.json",
+            R"([{"filename": "a.png", "width": 161, "height": 120, "lines": []}])");
+  const ProgramRun wrong = RunPlumbline("eval lines --model lsd --data " + dir.path() + " --json");
+  EXPECT_EQ(wrong.exit_code, 65);
+  EXPECT_THAT(wrong.err, HasSubstr("annotated as 161 x 120"));
+}
+
+TEST(Program, DeviceListIsJsonOrSaysThatThereIsNone) {
+  const ProgramRun run = RunPlumbline("device list --json");
+  if (run.exit_code == 69) GTEST_SKIP() << "no Vulkan loader: " << run.err;
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(json::parse(run.out)["devices"].is_array());
+}
+
+TEST(Program, UnknownDeviceIsNoDevice) {
+  const ProgramRun run = RunPlumbline("bench net --size 64 --device no-such-device --json");
+  EXPECT_EQ(run.exit_code, 69);
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(run.err, HasSubstr("no-such-device"));
+}
+
+TEST(Program, BenchNetReportsTimeAndWork) {
+  const ProgramRun run = RunPlumbline("bench net --preset nano --size 64 --frames 3 --json");
+  if (run.exit_code == 69) GTEST_SKIP() << "no usable device: " << run.err;
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_GT(report["median_ms"].get<double>(), 0.0);
+  EXPECT_GE(report["p95_ms"].get<double>(), report["median_ms"].get<double>());
+  EXPECT_GT(report["gmac"].get<double>(), 0.0);
+  EXPECT_TRUE(report["device"].is_string());
+}
+
+TEST(Program, NetworkWeightsThatAreMissingOrCorruptAreErrors) {
+  const TemporaryDirectory dir;
+  const std::string image = WriteRectangle(dir, "a.png");
+  const ProgramRun unknown = RunPlumbline("detect " + image + " --model no-such-preset");
+  if (unknown.exit_code == 69) GTEST_SKIP() << "no usable device: " << unknown.err;
+  EXPECT_EQ(unknown.exit_code, 66);
+  EXPECT_THAT(unknown.err, HasSubstr("no-such-preset"));
+  const std::string weights = testing::ReadAll("assets/models/nano.safetensors");
+  ASSERT_FALSE(weights.empty());
+  const std::string truncated =
+      dir.Write("short.safetensors", weights.substr(0, weights.size() - 10));
+  const ProgramRun cut = RunPlumbline("detect " + image + " --model " + truncated + " --json");
+  EXPECT_EQ(cut.exit_code, 65) << cut.err;
+  EXPECT_THAT(cut.out, IsEmpty());
+  EXPECT_THAT(cut.err, HasSubstr("short.safetensors"));
+}
+
+}  // namespace
+}  // namespace plumb::tools

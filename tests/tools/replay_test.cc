@@ -1,0 +1,301 @@
+// From a posed sequence to a map, from a map and priors to refined poses, and every way to fail.
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/tools/program_run.h"
+#include "tools/synth/sequence_writer.h"
+
+namespace plumb::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::ProgramRun;
+using testing::ReadAll;
+using testing::RunPlumbline;
+using testing::TemporaryDirectory;
+
+constexpr int kNumFrames = 9;
+constexpr int kNumQueries = 6;
+
+/// A small rendered room and its map, made once.
+class Replay : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    room_ = new TemporaryDirectory;
+    synth::SequenceOptions options;
+    options.seed = 2;
+    options.num_frames = kNumFrames;
+    options.sweep_deg = 20.0;
+    options.width_px = 320;
+    options.height_px = 240;
+    options.focal_px = 262.5;
+    options.samples_per_axis = 2;
+    const Status written = synth::WriteSequence(options, room_->path(), {});
+    ASSERT_TRUE(written) << written.error().message;
+    const ProgramRun built = RunPlumbline(BuildArguments(room_->path()) + " --out " + Map());
+    ASSERT_EQ(built.exit_code, 0) << built.err;
+  }
+  static void TearDownTestSuite() {
+    delete room_;
+    room_ = nullptr;
+  }
+
+  static std::string Map() { return *room_ / "map"; }
+  static std::string BuildArguments(const std::string& sequence) {
+    return "map build --sequence " + sequence + " --frames " + sequence +
+           "/splits/map.txt --model lsd --json";
+  }
+  static std::string ReplayArguments(const std::string& priors, const std::string& map) {
+    return "replay --sequence " + room_->path() + " --frames " + (*room_ / "splits/query.txt") +
+           " --priors " + priors + " --map " + map + " --model lsd --json";
+  }
+  static std::string Priors() { return *room_ / "splits/prior_p05.txt"; }
+
+  /// What may lie in `dir` after a failure: exactly what was there before.
+  static std::vector<std::string> Entries(const std::string& dir) {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(dir)) {
+      names.push_back(entry.path().filename().string());
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  /// Runs a replay that must fail with `code`, print nothing and leave nothing.
+  void ExpectFailure(const std::string& arguments, int code, const std::string& message) {
+    const TemporaryDirectory out;
+    const ProgramRun run = RunPlumbline(arguments + " --out " + (out / "run"));
+    EXPECT_EQ(run.exit_code, code) << run.err;
+    EXPECT_THAT(run.out, IsEmpty());
+    EXPECT_THAT(run.err, HasSubstr(message));
+    EXPECT_THAT(Entries(out.path()), IsEmpty());
+  }
+
+  /// The priors with one line edited.
+  std::string EditedPriors(const std::function<std::string(int, const std::string&)>& edit) {
+    std::istringstream lines(ReadAll(Priors()));
+    std::string line, text;
+    for (int number = 1; std::getline(lines, line); ++number) text += edit(number, line);
+    return dir_.Write("priors.txt", text);
+  }
+
+  static TemporaryDirectory* room_;
+  TemporaryDirectory dir_;
+};
+TemporaryDirectory* Replay::room_ = nullptr;
+
+TEST_F(Replay, MapInfoCountsWhatWasBuilt) {
+  const ProgramRun run = RunPlumbline("map info " + Map() + " --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json info = json::parse(run.out);
+  EXPECT_EQ(info["key_frames"], kNumFrames - kNumQueries);
+  EXPECT_EQ(info["detector"], "lsd");
+  EXPECT_GT(info["lines"].get<int>(), 20);
+  EXPECT_GT(info["points"].get<int>(), 20);
+}
+
+TEST_F(Replay, MapExportWritesPlyAndObj) {
+  for (const auto& [name, begin] : {std::pair("lines.ply", "ply\n"), std::pair("lines.obj", "")}) {
+    const ProgramRun run =
+        RunPlumbline("map export " + Map() + " --out " + (dir_ / name) + " --json");
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const std::string bytes = ReadAll(dir_ / name);
+    EXPECT_TRUE(bytes.starts_with(begin));
+    EXPECT_GT(bytes.size(), 1000u);
+    EXPECT_GT(json::parse(run.out)["lines"].get<int>(), 20);
+  }
+}
+
+TEST_F(Replay, RefinesEveryFrameAndSaysHowWell) {
+  const std::string out = dir_ / "run";
+  const ProgramRun run = RunPlumbline(ReplayArguments(Priors(), Map()) +
+                                      " --prior-size 5,1 --overlays 2 --out " + out);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(json::parse(run.out)["frames"], kNumQueries);
+  EXPECT_EQ(json::parse(ReadAll(out + "/summary.json"))["frames"], kNumQueries);
+  const auto count = [](const std::string& text, char c) {
+    return std::count(text.begin(), text.end(), c);
+  };
+  EXPECT_EQ(count(ReadAll(out + "/trajectory.txt"), '\n'), kNumQueries + 1);
+  EXPECT_EQ(count(ReadAll(out + "/frames.jsonl"), '\n'), kNumQueries);
+  const std::vector<std::string> files = Entries(out);
+  EXPECT_EQ(std::count_if(files.begin(), files.end(),
+                          [](const std::string& name) { return name.ends_with(".png"); }),
+            2);
+
+  const ProgramRun eval =
+      RunPlumbline("eval trajectory --run " + out + " --truth " + (*room_ / "groundtruth.txt") +
+                   " --priors " + Priors() + " --json");
+  ASSERT_EQ(eval.exit_code, 0) << eval.err;
+  const json report = json::parse(eval.out);
+  EXPECT_EQ(report["frames"], kNumQueries);
+  EXPECT_NEAR(report["prior"]["median_cm"].get<double>(), 5.0, 1e-3);
+  EXPECT_NEAR(report["prior"]["median_deg"].get<double>(), 1.0, 1e-3);
+  EXPECT_LT(report["refined"]["median_cm"].get<double>(), 1.0);
+  EXPECT_LT(report["refined"]["median_deg"].get<double>(), 0.3);
+  EXPECT_EQ(report["harmed"].get<double>(), 0.0);
+  int num_statuses = 0;
+  for (const auto& [status, n] : report["status"].items()) num_statuses += n.get<int>();
+  EXPECT_EQ(num_statuses, kNumQueries);
+}
+
+TEST_F(Replay, EqualInputsGiveEqualBytes) {
+  for (const char* name : {"a", "b"}) {
+    const ProgramRun run =
+        RunPlumbline(ReplayArguments(Priors(), Map()) + " --overlays 0 --out " + (dir_ / name));
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+  }
+  EXPECT_EQ(ReadAll(dir_ / "a/trajectory.txt"), ReadAll(dir_ / "b/trajectory.txt"));
+}
+
+TEST_F(Replay, StreamPointsAndPaperRun) {
+  for (const char* extra :
+       {"--mode stream", "--points opencv", "--method paper", "--method paper --points opencv"}) {
+    const std::string out = dir_ / "run";  // an earlier run there is replaced
+    const ProgramRun run =
+        RunPlumbline(ReplayArguments(Priors(), Map()) + " --overlays 0 " + extra + " --out " + out);
+    ASSERT_EQ(run.exit_code, 0) << extra << ": " << run.err;
+    EXPECT_EQ(json::parse(run.out)["frames"], kNumQueries) << extra;
+    EXPECT_THAT(Entries(dir_.path()), ::testing::ElementsAre("run"));
+  }
+}
+
+TEST_F(Replay, BenchFrameReportsPercentilesPerStage) {
+  const ProgramRun run = RunPlumbline("bench frame --sequence " + room_->path() + " --frames " +
+                                      (*room_ / "splits/query.txt") + " --priors " + Priors() +
+                                      " --map " + Map() + " --model lsd --warm-up 2 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_EQ(report["frames"], kNumQueries - 2);
+  EXPECT_EQ(report["mode"], "stream");
+  EXPECT_GT(report["fps"].get<double>(), 0.0);
+  for (const char* stage : {"detect", "ridge", "search", "match_and_refine", "total"}) {
+    EXPECT_LE(report["ms"][stage]["p50"].get<double>(), report["ms"][stage]["p99"].get<double>())
+        << stage;
+  }
+  EXPECT_GT(report["ms"]["detect"]["p50"].get<double>(), 0.0);
+}
+
+TEST_F(Replay, ANanInAPriorIsNamedByItsLine) {
+  const std::string priors = EditedPriors([](int number, const std::string& line) {
+    return number == 3 ? line.substr(0, line.find(' ')) + " nan 0 0 0 0 0 1\n" : line + "\n";
+  });
+  ExpectFailure(ReplayArguments(priors, Map()), 65, priors + ":3: \"nan\" is not finite");
+}
+
+TEST_F(Replay, PriorsThatNameNoFrameAreRefused) {
+  const std::string priors = dir_.Write("other.txt", "12345.0 0 0 0 0 0 0 1\n");
+  ExpectFailure(ReplayArguments(priors, Map()), 65, "names none of the 6 frames");
+}
+
+TEST_F(Replay, AFrameWithoutAPriorIsNamed) {
+  const std::string priors = EditedPriors([](int number, const std::string& line) {
+    return number == 4 ? std::string() : line + "\n";
+  });
+  ExpectFailure(ReplayArguments(priors, Map()), 65, "no pose for 1 of the 6 frames");
+}
+
+TEST_F(Replay, MissingInputsAreMissing) {
+  ExpectFailure(ReplayArguments(Priors(), dir_ / "no-map"), 66, "no-map");
+  ExpectFailure(ReplayArguments(dir_ / "no-priors.txt", Map()), 66, "no-priors.txt");
+}
+
+TEST_F(Replay, BadPriorSizesAreWrongUsage) {
+  for (const char* size : {"10", "10,", "0,1", "10,-2", "nan,1", "1,2,3"}) {
+    ExpectFailure(ReplayArguments(Priors(), Map()) + " --prior-size " + size, 64, "--prior-size");
+  }
+}
+
+TEST_F(Replay, TruncatedAndFlippedMapsAreBadData) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(Map())) {
+    if (entry.is_regular_file()) files.push_back(fs::relative(entry.path(), Map()));
+  }
+  ASSERT_FALSE(files.empty());
+  for (const fs::path& file : files) {
+    const std::string bytes = ReadAll((fs::path(Map()) / file).string());
+    for (const bool flip : {false, true}) {
+      const TemporaryDirectory copy;
+      fs::copy(Map(), copy / "map", fs::copy_options::recursive);
+      std::string broken = flip ? bytes : bytes.substr(0, bytes.size() / 2);
+      if (flip) broken[bytes.size() / 2] = static_cast<char>(broken[bytes.size() / 2] ^ 4);
+      copy.Write("map/" + file.string(), broken);
+      ExpectFailure(ReplayArguments(Priors(), copy / "map"), 65, "map");
+    }
+  }
+}
+
+TEST_F(Replay, OtherPeoplesDirectoriesAreNotReplaced) {
+  dir_.Write("run/thesis.txt", "years of work");
+  const ProgramRun run =
+      RunPlumbline(ReplayArguments(Priors(), Map()) + " --out " + (dir_ / "run"));
+  EXPECT_EQ(run.exit_code, 73);
+  EXPECT_EQ(ReadAll(dir_ / "run/thesis.txt"), "years of work");
+  const ProgramRun built = RunPlumbline(BuildArguments(room_->path()) + " --out " + (dir_ / "run"));
+  EXPECT_EQ(built.exit_code, 73);
+  EXPECT_THAT(Entries(dir_.path()), ::testing::ElementsAre("run"));
+}
+
+TEST_F(Replay, OutputsNeedAnExistingParent) {
+  const ProgramRun run =
+      RunPlumbline(ReplayArguments(Priors(), Map()) + " --out " + (dir_ / "no/run"));
+  EXPECT_EQ(run.exit_code, 73);
+  EXPECT_THAT(run.err, HasSubstr("no directory"));
+}
+
+TEST_F(Replay, AMissingDepthImageStopsTheBuildAndLeavesNoMap) {
+  const TemporaryDirectory copy;
+  fs::copy(room_->path(), copy / "room", fs::copy_options::recursive);
+  fs::remove(copy / "room/depth/000003.png");
+  const ProgramRun run = RunPlumbline(BuildArguments(copy / "room") + " --out " + (dir_ / "map"));
+  EXPECT_EQ(run.exit_code, 66) << run.err;
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(run.err, HasSubstr("depth/000003.png"));
+  EXPECT_THAT(Entries(dir_.path()), IsEmpty());
+}
+
+TEST_F(Replay, ABrokenImageStopsTheReplayHalfWayAndLeavesNoRun) {
+  const TemporaryDirectory copy;
+  fs::copy(room_->path(), copy / "room", fs::copy_options::recursive);
+  const std::string list = ReadAll(copy / "room/rgb.txt");
+  const size_t begin = list.find("rgb/000005");
+  ASSERT_NE(begin, std::string::npos);
+  const std::string image = list.substr(begin, list.find('\n', begin) - begin);
+  copy.Write("room/" + image, "no image");
+  const ProgramRun run = RunPlumbline("replay --sequence " + (copy / "room") + " --frames " +
+                                      (copy / "room/splits/query.txt") + " --priors " + Priors() +
+                                      " --map " + Map() + " --model lsd --out " + (dir_ / "run"));
+  EXPECT_EQ(run.exit_code, 65) << run.err;
+  EXPECT_THAT(run.err, HasSubstr(image));
+  EXPECT_THAT(Entries(dir_.path()), IsEmpty());
+}
+
+TEST_F(Replay, EvalNeedsARunAndMatchingTruth) {
+  const std::string rest = " --truth " + (*room_ / "groundtruth.txt") + " --priors " + Priors();
+  EXPECT_EQ(RunPlumbline("eval trajectory --run " + (dir_ / "none") + rest).exit_code, 66);
+  dir_.Write("run/trajectory.txt", ReadAll(Priors()));
+  dir_.Write("run/frames.jsonl", "{\"status\": 1}\n");
+  const ProgramRun corrupt = RunPlumbline("eval trajectory --run " + (dir_ / "run") + rest);
+  EXPECT_EQ(corrupt.exit_code, 65);
+  EXPECT_THAT(corrupt.err, HasSubstr("frames.jsonl:1"));
+  dir_.Write("run/frames.jsonl", "");
+  const std::string truth = dir_.Write("truth.txt", "777 0 0 0 0 0 0 1\n");
+  const ProgramRun apart = RunPlumbline("eval trajectory --run " + (dir_ / "run") + " --truth " +
+                                        truth + " --priors " + Priors());
+  EXPECT_EQ(apart.exit_code, 65);
+  EXPECT_THAT(apart.err, HasSubstr("truth.txt"));
+}
+
+}  // namespace
+}  // namespace plumb::tools

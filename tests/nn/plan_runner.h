@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -16,6 +17,9 @@
 #include "support/gpu_fixture.h"
 
 namespace plumb::nn {
+
+/// Software drivers compile at the first submission, which takes its time on a busy machine.
+inline constexpr std::chrono::minutes kCompileTimeout(9);
 
 /// Uniform in -1..1, reproducible.
 inline std::vector<float> RandomValues(size_t count, uint32_t seed) {
@@ -119,7 +123,7 @@ class PlanTest : public plumb::testing::GpuTest {
     auto list = (*recorder)->Finish();
     PLUMB_EXPECT_OK(list);
     if (!list) return {};
-    PLUMB_EXPECT_OK((*list)->Run());
+    PLUMB_EXPECT_OK((*list)->Run(kCompileTimeout));
     return Read<float>((*executor)->Tensor(output));
   }
 };

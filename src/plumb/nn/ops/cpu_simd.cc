@@ -41,7 +41,7 @@ int MaxInputs(Taps taps) {
     case Taps::k3x3:
       return 64;
     default:
-      return 32;
+      return 16;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 
 #include <ceres/loss_function.h>
 #include <ceres/manifold.h>
@@ -32,8 +33,25 @@ bool IsFinite(const PointObservation& point) {
 
 bool IsValid(const Camera& camera, const Rigid3& start, const JointSolverOptions& options) {
   return camera.IsValid() && start.IsFinite() && start.rotation.norm() > 0.5 &&
-         options.huber_px > 0.0 && std::isfinite(options.huber_px) && options.max_iterations >= 1;
+         options.huber_px > 0.0 && std::isfinite(options.huber_px) && options.line_robust > 0.0 &&
+         options.point_robust > 0.0 && options.max_iterations >= 1;
 }
+
+/// rho(s) = s / (1 + s / scale^2), whose weight is that of AccumulateLines().
+class GemanMcClureLoss final : public ceres::LossFunction {
+ public:
+  explicit GemanMcClureLoss(double scale) : inverse_square_(1.0 / (scale * scale)) {}
+
+  void Evaluate(double s, double rho[3]) const override {
+    const double q = 1.0 / (1.0 + s * inverse_square_);
+    rho[0] = s * q;
+    rho[1] = q * q;
+    rho[2] = -2.0 * inverse_square_ * q * q * q;
+  }
+
+ private:
+  const double inverse_square_;
+};
 
 /// One pose, and the residual blocks that can be evaluated at it. Ceres aborts the process on
 /// misuse, so that only checked input gets here.
@@ -45,20 +63,20 @@ class PoseProblem {
     problem_.AddParameterBlock(Translation(), 3);
   }
 
-  /// Takes ownership of `cost`. `huber` <= 0: no robust loss.
+  /// Takes ownership of `cost` and `loss`; nullptr: not robust.
   /// @return false, and adds nothing, when the cost cannot be evaluated at the start.
-  bool Add(ceres::CostFunction* cost, double huber, double weight) {
+  bool Add(ceres::CostFunction* cost, ceres::LossFunction* loss, double weight) {
     std::unique_ptr<ceres::CostFunction> owned(cost);
+    std::unique_ptr<ceres::LossFunction> owned_loss(loss);
     const double* blocks[] = {Rotation(), Translation()};
     double residuals[6];
     if (!owned->Evaluate(blocks, residuals, nullptr)) return false;
     for (int i = 0; i < owned->num_residuals(); ++i) {
       if (!std::isfinite(residuals[i])) return false;
     }
-    ceres::LossFunction* loss = huber > 0.0 ? new ceres::HuberLoss(huber) : nullptr;
-    problem_.AddResidualBlock(owned.release(),
-                              new ceres::ScaledLoss(loss, weight, ceres::TAKE_OWNERSHIP),
-                              Rotation(), Translation());
+    problem_.AddResidualBlock(
+        owned.release(), new ceres::ScaledLoss(owned_loss.release(), weight, ceres::TAKE_OWNERSHIP),
+        Rotation(), Translation());
     return true;
   }
 
@@ -114,18 +132,18 @@ std::optional<JointSolution> SolvePaperCost(const Camera& camera, const Rigid3& 
   for (const PaperLine& line : lines) {
     // A line whose midpoint has no image contributes no angle either.
     if (!problem.Add(MidpointDistanceCost::Create(camera, line.line_in_world, line.segment_px, 1.0),
-                     options.huber_px, alpha)) {
+                     new ceres::HuberLoss(options.huber_px), alpha)) {
       continue;
     }
     problem.Add(LineAngleCost::Create(camera, line.line_in_world, line.segment_px, line.scale_px),
-                options.huber_px, alpha);
+                new ceres::HuberLoss(options.huber_px), alpha);
     ++num_lines;
   }
   for (const PointObservation& point : points) {
     num_points +=
         problem.Add(PointReprojectionCost::Create(camera, point.point_in_world, point.pixel,
                                                   Eigen::Matrix2d::Identity()),
-                    options.huber_px, beta);
+                    new ceres::HuberLoss(options.huber_px), beta);
   }
   auto solution = problem.Solve(options);
   if (solution) {
@@ -157,11 +175,12 @@ std::optional<JointSolution> SolveOverlapCost(const Camera& camera, const Rigid3
 
   PoseProblem problem(start);
   int num_lines = 0, num_points = 0;
+  // Both ends of a line share one block, hence twice the square of one residual's scale.
   for (const LineObservation& line : lines) {
     const double sigma = std::sqrt(line.variance_px2);
     num_lines += problem.Add(
         OverlapDistanceCost::Create(camera, line.line_in_world, line.part_px, 1.0 / sigma),
-        options.huber_px / sigma, line.weight);
+        new GemanMcClureLoss(options.line_robust * std::numbers::sqrt2), line.weight);
   }
   const Eigen::Matrix3d rotation = start.RotationMatrix();
   for (const PointObservation& point : points) {
@@ -175,13 +194,13 @@ std::optional<JointSolution> SolveOverlapCost(const Camera& camera, const Rigid3
     num_points += problem.Add(
         PointReprojectionCost::Create(camera, point.point_in_world, point.pixel,
                                       PointReprojectionCost::FromCovariance(covariance)),
-        options.huber_px / kPixelSigma, 1.0);
+        new GemanMcClureLoss(options.point_robust), 1.0);
   }
   if (num_lines + num_points == 0) return std::nullopt;
   if (prior) {
     problem.Add(PosePriorCost::Create(prior->cam_from_world, prior->rotation_sigma_rad,
                                       prior->position_sigma_m),
-                0.0, 1.0);
+                nullptr, 1.0);
   }
   auto solution = problem.Solve(options);
   if (solution) {

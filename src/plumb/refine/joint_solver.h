@@ -19,7 +19,9 @@ struct PaperLine {
 };
 
 struct JointSolverOptions {
-  double huber_px = 2.0;    // > 0
+  double huber_px = 2.0;  // of the paper's cost, > 0
+  /// Scales of the overlap cost's Geman-McClure loss, in deviations of a residual, > 0.
+  double line_robust = 1.0, point_robust = 3.0;
   int max_iterations = 25;  // >= 1
 };
 
@@ -43,8 +45,9 @@ std::optional<JointSolution> SolvePaperCost(const Camera& camera, const Rigid3& 
                                             std::span<const PointObservation> points,
                                             const JointSolverOptions& options);
 
-/// Minimises the overlap distances (Huber at `huber_px`, divided by each observation's standard
-/// deviation), the points whitened by pixel noise and depth deviation, and the prior.
+/// Minimises the overlap distances over each observation's standard deviation, the points whitened
+/// by pixel noise and depth deviation, and the prior. The loss is that of AccumulateLines() and
+/// PointAccumulator, taken once per observation, so that their steps lead to the same pose.
 /// @param prior  Optional.
 /// @return as SolvePaperCost.
 std::optional<JointSolution> SolveOverlapCost(const Camera& camera, const Rigid3& start,

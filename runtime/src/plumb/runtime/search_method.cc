@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "plumb/refine/joint_solver.h"
 #include "plumb/refine/uncertainty.h"
 
 namespace plumb {
@@ -32,6 +33,10 @@ constexpr size_t kMinLocalLines = 20;
 constexpr size_t kMinPoints = 6;
 // A pose from points alone is a start for the lines, and with many points an answer.
 constexpr size_t kMinSolvingPoints = 12, kMinDecidingPoints = 40;
+
+// The joint solution's last word.
+constexpr double kLineRobust = 1.0, kPointRobust = 3.0;  // as in the steps before
+constexpr int kPolishSteps = 5;
 
 constexpr double kMinScale = 0.02;  // of residuals: perfect input must not divide by zero
 
@@ -243,6 +248,25 @@ void SearchMethod::FinishWithPoints(const RefineInput& input, const PosePriorFac
       local_lines_.size() < kMinLocalLines ? fine_lines_ : local_lines_;
   *alignment = aligner_.Align(input.camera, alignment->cam_from_world, lines, segments_,
                               JointSchedule(), prior, near_points_);
+  Polish(input.camera, prior, alignment);
+}
+
+void SearchMethod::Polish(const Camera& camera, const PosePriorFactor& prior,
+                          FineAlignment* alignment) {
+  // The cost measures points in their whitened units; lines and prior follow in the same.
+  const double line_factor =
+      alignment->point_scale / std::max(alignment->residual_scale, kMinScale);
+  line_observations_.assign(aligner_.observations().begin(), aligner_.observations().end());
+  for (LineObservation& line : line_observations_) line.weight *= line_factor;
+  PosePriorFactor scaled_prior = prior;
+  scaled_prior.rotation_sigma_rad /= std::sqrt(alignment->point_scale);
+  scaled_prior.position_sigma_m /= std::sqrt(alignment->point_scale);
+  const auto solution = SolveOverlapCost(
+      camera, alignment->cam_from_world, line_observations_, near_points_, &scaled_prior,
+      {.line_robust = kLineRobust,
+       .point_robust = kPointRobust * std::sqrt(alignment->point_scale),
+       .max_iterations = kPolishSteps});
+  if (solution) alignment->cam_from_world = solution->cam_from_world;
 }
 
 void SearchMethod::ReportMatches(const Camera& camera, const Rigid3& cam_from_world,

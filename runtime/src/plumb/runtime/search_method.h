@@ -62,6 +62,8 @@ class SearchMethod {
                           FineAlignment* alignment);
   void FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
                         FineAlignment* alignment);
+  /// Levenberg-Marquardt on the last associations, lines and points together, until it converges.
+  void Polish(const Camera& camera, const PosePriorFactor& prior, FineAlignment* alignment);
   void ReportMatches(const Camera& camera, const Rigid3& cam_from_world, RefineResult* result);
 
   const MapIndex& index_;
@@ -79,6 +81,7 @@ class SearchMethod {
   std::vector<Survivor> survivors_;
   PointSolver point_solver_;
   PointPose point_pose_;  // without inliers: none
+  std::vector<LineObservation> line_observations_;
   std::vector<PointObservation> all_points_, near_points_;
   SoftAssociator associator_;
   std::vector<LinePair> pairs_;

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "nn/plan_runner.h"
+#include "plumb/nn/network_bench.h"
 #include "plumb/nn/reference/network_reference.h"
 #include "plumb/nn/safetensors.h"
 
@@ -120,6 +121,41 @@ TEST_F(NetworkOnDevice, RefusesABadSize) {
   const auto network = Network::Create(device_, RandomModel(ModelSpec(), 1), {.input_width = 100});
   ASSERT_FALSE(network);
   EXPECT_EQ(network.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(NetworkOnDevice, RefusesActivationsThatNoKernelCanBind) {
+  ModelSpec spec;
+  spec.width = 8;
+  spec.block = BlockKind::kBasic;
+  const NetworkOptions options{.input_width = 4096, .input_height = 4096};
+  if (device_->Info().limits.max_storage_buffer_bytes >= uint64_t{1} << 28) {
+    GTEST_SKIP() << "the device binds everything";
+  }
+  const auto network = Network::Create(device_, RandomModel(spec, 1), options);
+  ASSERT_FALSE(network);
+  EXPECT_EQ(network.error().code, ErrorCode::kUnsupported);
+  EXPECT_NE(network.error().message.find("exceeds the"), std::string::npos);
+}
+
+TEST_F(NetworkOnDevice, BenchTimesEveryFrameAndLayer) {
+  ModelSpec spec;
+  spec.width = 4;
+  spec.input_width = spec.input_height = 64;
+  const Model model = RandomModel(spec, 1);
+  NetworkBenchOptions options;
+  options.num_frames = 3;
+  options.num_warm_up = 1;
+  options.times_layers = true;
+  auto result = BenchNetwork(device_, model, options);
+  PLUMB_ASSERT_OK(result);
+  ASSERT_EQ(result->frame_ms.size(), 3u);
+  for (const double ms : result->frame_ms) EXPECT_GT(ms, 0);
+  EXPECT_GT(result->first_frame_ms, 0);
+  if (device_->Info().timestamp_period_ns > 0) {
+    EXPECT_EQ(result->layers.size(), static_cast<size_t>(result->info.num_dispatches));
+  }
+  options.num_frames = 0;
+  EXPECT_EQ(BenchNetwork(device_, model, options).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST_F(NetworkOnDevice, StatesItsFacts) {

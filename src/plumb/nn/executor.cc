@@ -33,8 +33,8 @@ Result<std::unique_ptr<Executor>> Executor::Create(std::shared_ptr<gpu::Device> 
                                                    const ExecutorOptions& options) {
   std::unique_ptr<Executor> executor(new Executor(std::move(device)));
   std::vector<gpu::BufferSlice> constants;
-  if (const Status status = executor->Upload(plan, constants); !status) return status.error();
   if (const Status status = executor->PlaceTensors(plan, options); !status) return status.error();
+  if (const Status status = executor->Upload(plan, constants); !status) return status.error();
   for (size_t i = 0; i < plan.dispatches.size(); ++i) {
     const DispatchInfo& dispatch = plan.dispatches[i];
     auto kernel = executor->FindKernel(dispatch);
@@ -96,6 +96,15 @@ Status Executor::PlaceTensors(const DispatchPlan& plan, const ExecutorOptions& o
       if (operand.tensor != Operand::kConstants && !has_own_buffer(operand.tensor)) {
         uses.back().push_back(operand.tensor);
       }
+    }
+  }
+  const uint64_t limit = device_->Info().limits.max_storage_buffer_bytes;
+  for (const size_t bytes : plan.tensor_bytes) {
+    if (bytes > limit) {
+      return Error{ErrorCode::kUnsupported, "network: an activation of " + std::to_string(bytes) +
+                                                " bytes exceeds the " + std::to_string(limit) +
+                                                " bytes that a kernel can bind on " +
+                                                device_->Info().name};
     }
   }
   std::vector<LiveRange> ranges = LiveRanges(uses, plan.tensor_bytes);

@@ -77,7 +77,7 @@ class GatedDetector : public LineDetector {
     int num_submitted = 0, num_collected = 0;
     bool is_in_background = false;
     ErrorCode error = ErrorCode::kInternal;
-    bool fails = false;
+    bool fails = false, is_stuck = false;
 
     void Allow(int count) {
       const std::scoped_lock lock(mutex);
@@ -107,6 +107,7 @@ class GatedDetector : public LineDetector {
       ++control_->num_collected;
       control_->changed.wait(lock,
                              [&] { return control_->num_collected <= control_->num_allowed; });
+      if (control_->is_stuck) return Error{ErrorCode::kInternal, "no answer in time"};
     }
     return lsd_->Collect();
   }
@@ -319,6 +320,17 @@ TEST_F(SessionTest, LostDeviceRefusesFurtherFrames) {
   Start(Blocking());
   Submit(0);
   EXPECT_EQ(Next().error.code, ErrorCode::kDeviceLost);
+  const Result<SubmitOutcome> refused = session_->Submit(TheRoom().Frame(1, PriorError()));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kDeviceLost);
+}
+
+TEST_F(SessionTest, DeviceThatDoesNotAnswerIsLost) {
+  control_->is_in_background = true;
+  control_->is_stuck = true;
+  Start(Blocking());
+  Submit(0);
+  EXPECT_EQ(Next().error.message, "no answer in time");
   const Result<SubmitOutcome> refused = session_->Submit(TheRoom().Frame(1, PriorError()));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kDeviceLost);

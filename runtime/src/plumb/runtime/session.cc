@@ -173,7 +173,8 @@ void Session::Impl::StartDetection(FrameSlot* slot) {
 }
 
 void Session::Impl::FinishDetection(FrameSlot* slot) {
-  if (slot->detection) {
+  const bool was_submitted = slot->detection.has_value();
+  if (was_submitted) {
     slot->detection = Contain([&]() -> Status {
       Result<std::vector<Segment2>> segments = detector->Collect();
       if (!segments) return segments.error();
@@ -181,8 +182,10 @@ void Session::Impl::FinishDetection(FrameSlot* slot) {
       return Ok();
     });
   }
-  if (!slot->detection && slot->detection.error().code == ErrorCode::kDeviceLost) {
-    is_device_lost = true;
+  if (!slot->detection) {
+    // A device that does not give a frame back would refuse all that follow.
+    const bool is_stuck = was_submitted && detector->WorksInBackground();
+    if (is_stuck || slot->detection.error().code == ErrorCode::kDeviceLost) is_device_lost = true;
   }
   slot->detect_end_ns = NowNs();
 }

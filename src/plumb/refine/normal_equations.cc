@@ -31,6 +31,32 @@ void Symmetrize(NormalEquations* equations) {
       equations->information.transpose();
 }
 
+/// What all points of one line share.
+struct LineImage {
+  LineImage(const Camera& camera, const Eigen::Vector3d& a, const Eigen::Vector3d& b)
+      : normal(a.cross(b)), delta(b - a) {
+    exists = normal.head<2>().squaredNorm() >
+             kMinRaySine * kMinRaySine * a.squaredNorm() * b.squaredNorm();  // False for NaN.
+    m = {normal.x() / (camera.fx * camera.fx), normal.y() / (camera.fy * camera.fy), 0.0};
+    inverse_norm = 1.0 / std::sqrt(normal.x() * m.x() + normal.y() * m.y());
+  }
+
+  PointLineDistance DistanceOf(const Camera& camera, const Eigen::Vector2d& point_px) const {
+    const Eigen::Vector3d x((point_px.x() - camera.cx) / camera.fx,
+                            (point_px.y() - camera.cy) / camera.fy, 1.0);
+    PointLineDistance out;
+    out.residual_px = normal.dot(x) * inverse_norm;
+    // d residual / d normal
+    const Eigen::Vector3d q = (x - (out.residual_px * inverse_norm) * m) * inverse_norm;
+    out.jacobian << normal.cross(q), delta.cross(q);
+    return out;
+  }
+
+  Eigen::Vector3d normal, delta, m;
+  double inverse_norm;
+  bool exists;
+};
+
 }  // namespace
 
 void NormalEquations::Add(const NormalEquations& other, double factor) {
@@ -41,20 +67,9 @@ void NormalEquations::Add(const NormalEquations& other, double factor) {
 std::optional<PointLineDistance> DistanceToLine(const Camera& camera, const Eigen::Vector3d& a,
                                                 const Eigen::Vector3d& b,
                                                 const Eigen::Vector2d& point_px) {
-  const Eigen::Vector3d n = a.cross(b);
-  if (!(n.head<2>().squaredNorm() >
-        kMinRaySine * kMinRaySine * a.squaredNorm() * b.squaredNorm())) {
-    return std::nullopt;
-  }
-  const Eigen::Vector3d m(n.x() / (camera.fx * camera.fx), n.y() / (camera.fy * camera.fy), 0.0);
-  const double norm = std::sqrt(n.x() * m.x() + n.y() * m.y());
-  const Eigen::Vector3d x((point_px.x() - camera.cx) / camera.fx,
-                          (point_px.y() - camera.cy) / camera.fy, 1.0);
-  PointLineDistance out;
-  out.residual_px = n.dot(x) / norm;
-  const Eigen::Vector3d q = (x - (out.residual_px / norm) * m) / norm;  // d residual / d n
-  out.jacobian << n.cross(q), (b - a).cross(q);
-  return out;
+  const LineImage image(camera, a, b);
+  if (!image.exists) return std::nullopt;
+  return image.DistanceOf(camera, point_px);
 }
 
 LineEquations AccumulateLines(const Camera& camera, const Rigid3& cam_from_world,
@@ -67,13 +82,14 @@ LineEquations AccumulateLines(const Camera& camera, const Rigid3& cam_from_world
         rotation * observation.line_in_world.start + cam_from_world.translation;
     const Eigen::Vector3d b = rotation * observation.line_in_world.end + cam_from_world.translation;
     const double variance = observation.variance_px2;
+    const LineImage image(camera, a, b);
+    if (!image.exists) continue;
     for (const Eigen::Vector2d* point : {&observation.part_px.start, &observation.part_px.end}) {
-      const auto distance = DistanceToLine(camera, a, b, *point);
-      if (!distance) continue;
-      const double square = distance->residual_px * distance->residual_px;
+      const PointLineDistance distance = image.DistanceOf(camera, *point);
+      const double square = distance.residual_px * distance.residual_px;
       const double q = 1.0 + square / (robust * robust * variance);
       const double weight = observation.weight / (variance * q * q);
-      AddRankOne(distance->jacobian, distance->residual_px, weight, &out.equations);
+      AddRankOne(distance.jacobian, distance.residual_px, weight, &out.equations);
       weighted_squares += weight * square;
       weighted_variances += weight * variance;
       ++out.num_residuals;

@@ -17,6 +17,9 @@ constexpr double kMinVisiblePx = 10.0;
 // The prior is a weak factor of the alignment: it decides only what the lines leave open.
 constexpr double kPriorFactorScale = 2.0;
 
+// Aligned half way, poses nearer than this end at the same place.
+constexpr double kSamePositionM = 0.01, kSameRotationRad = 0.005;
+
 constexpr double kSearchGain = 1.03, kStreamGain = 1.0;
 
 // A second attempt looks twice as far. A prior that was found good needs none.
@@ -47,6 +50,11 @@ int64_t NowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::steady_clock::now().time_since_epoch())
       .count();
+}
+
+bool IsSame(const Rigid3& a_from_world, const Rigid3& b_from_world) {
+  const PoseDistance distance = DistanceBetween(a_from_world, b_from_world);
+  return distance.position_m < kSamePositionM && distance.rotation_rad < kSameRotationRad;
 }
 
 PosePriorFactor WeakFactor(const PosePrior& prior) {
@@ -167,9 +175,17 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
   const auto align_from = [&](const Rigid3& start) {
     selector_.SelectForAlignment(input.camera, start, &fine_lines_);
     if (fine_lines_.size() < kMinLines) return;
+    // Half way it shows whether a start leads to an answer that is already there.
+    const auto align = [&](const Rigid3& from, std::span<const AlignmentStep> steps) {
+      return aligner_.Align(input.camera, from, fine_lines_, segments_, steps, WeakFactor(prior));
+    };
+    const size_t half = schedule.size() / 2;
+    const Rigid3 half_way = align(start, schedule.first(half)).cam_from_world;
+    for (const Survivor& other : survivors_) {
+      if (IsSame(half_way, other.alignment.cam_from_world)) return;
+    }
     Survivor& survivor = survivors_.emplace_back();
-    survivor.alignment =
-        aligner_.Align(input.camera, start, fine_lines_, segments_, schedule, WeakFactor(prior));
+    survivor.alignment = align(half_way, schedule.subspan(half));
     survivor.support = MeasureSupport(input.camera, survivor.alignment.cam_from_world);
   };
   for (const FoundPose& start : starts) align_from(start.cam_from_world);

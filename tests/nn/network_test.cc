@@ -107,6 +107,15 @@ TEST_F(NetworkOnDevice, NanoAgreesWithTheReferenceAtItsWidths) {
   EXPECT_LT(RelativeError(output, expected), kTolerance);
 }
 
+TEST_F(NetworkOnDevice, TheShippedModelAgreesWithTheReference) {
+  auto model = LoadModel("assets/models/nano.safetensors");
+  PLUMB_ASSERT_OK(model);
+  const auto image = RandomValues(static_cast<size_t>(3) * 128 * 64, 6);
+  const auto expected = reference::RunUnfused(*model, image, 128, 64);
+  const auto output = Forward(*model, {.input_width = 128, .input_height = 64}, image);
+  EXPECT_LT(RelativeError(output, expected), kTolerance);
+}
+
 TEST_F(NetworkOnDevice, ASecondRunGivesTheSameBytes) {
   ModelSpec spec;
   spec.width = 4;

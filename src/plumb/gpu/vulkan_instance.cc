@@ -111,6 +111,17 @@ Result<std::unique_ptr<Instance>> Instance::Create(bool validation) {
   const VkValidationFeatureEnableEXT checks[] = {
       VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
   auto features = MakeInfo<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
+#ifdef VK_EXT_layer_settings
+  // Newer layers (Debian 13) look at what shaders access only when told to.
+  const VkBool32 on = VK_TRUE;
+  const VkLayerSettingEXT setting{kValidationLayer, "syncval_shader_accesses_heuristic",
+                                  VK_LAYER_SETTING_TYPE_BOOL32_EXT, 1, &on};
+  auto settings =
+      MakeInfo<VkLayerSettingsCreateInfoEXT>(VK_STRUCTURE_TYPE_LAYER_SETTINGS_CREATE_INFO_EXT);
+  settings.settingCount = 1;
+  settings.pSettings = &setting;
+  messenger.pNext = &settings;
+#endif
   if (validation) {
     features.enabledValidationFeatureCount = 1;
     features.pEnabledValidationFeatures = checks;

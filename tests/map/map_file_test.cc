@@ -6,9 +6,11 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "plumb/map/map_check.h"
 #include "plumb/map/map_manifest.h"

@@ -1,6 +1,5 @@
 #include "plumb/map/map_file.h"
 
-#include <dirent.h>
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -8,8 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <memory>
+#include <filesystem>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "plumb/base/file.h"
@@ -25,20 +25,26 @@ constexpr const char* kTilesName = "tiles";
 constexpr size_t kMaxManifestBytes = 64 << 10;
 
 /// Inside a map everything is the map's own fault, a missing file too.
-Error Inside(Error error) {
+Error AsCorrupt(Error error) {
   if (error.code == ErrorCode::kNotFound) error.code = ErrorCode::kCorruptData;
   return error;
 }
 
+std::string Inside(const std::string& directory, std::string_view name) {
+  std::string path = directory;
+  path += '/';
+  path += name;
+  return path;
+}
+
 Result<std::vector<std::string>> NamesIn(const std::string& directory) {
-  const std::unique_ptr<DIR, int (*)(DIR*)> stream(opendir(directory.c_str()), closedir);
-  if (stream == nullptr) return SystemError(errno, "list", directory);
   std::vector<std::string> names;
-  for (const dirent* entry = readdir(stream.get()); entry != nullptr;
-       entry = readdir(stream.get())) {  // NOLINT(concurrency-mt-unsafe): own stream
-    const std::string name = entry->d_name;
-    if (name != "." && name != "..") names.push_back(name);
+  std::error_code code;
+  std::filesystem::directory_iterator entry(directory, code), end;
+  for (; !code && entry != end; entry.increment(code)) {
+    names.push_back(entry->path().filename().string());
   }
+  if (code) return SystemError(code.value(), "list", directory);
   return names;
 }
 
@@ -51,7 +57,7 @@ bool HoldsOnlyMap(const std::string& directory) {
   });
   if (!plain) return false;
   if (std::find(names->begin(), names->end(), kTilesName) == names->end()) return true;
-  const auto tiles = NamesIn(directory + "/" + kTilesName);
+  const auto tiles = NamesIn(Inside(directory, kTilesName));
   return tiles && std::all_of(tiles->begin(), tiles->end(), [](const std::string& name) {
            return std::string_view(name).ends_with(".plt");
          });
@@ -59,20 +65,20 @@ bool HoldsOnlyMap(const std::string& directory) {
 
 /// Removes a directory that HoldsOnlyMap(); whatever else is in it stays.
 void RemoveMap(const std::string& directory) {
-  const std::string tiles = directory + "/" + kTilesName;
+  const std::string tiles = Inside(directory, kTilesName);
   if (const auto names = NamesIn(tiles)) {
     for (const std::string& name : *names) {
-      if (std::string_view(name).ends_with(".plt")) unlink((tiles + "/" + name).c_str());
+      if (std::string_view(name).ends_with(".plt")) unlink(Inside(tiles, name).c_str());
     }
   }
   rmdir(tiles.c_str());
-  unlink((directory + "/" + kManifestName).c_str());
+  unlink(Inside(directory, kManifestName).c_str());
   rmdir(directory.c_str());
 }
 
 Status WriteFiles(const std::string& directory, const MapManifest& manifest,
                   const MapTiles& tiles) {
-  const std::string tiles_path = directory + "/" + kTilesName;
+  const std::string tiles_path = Inside(directory, kTilesName);
   if (mkdir(tiles_path.c_str(), 0777) != 0) return SystemError(errno, "create", tiles_path);
   const Result<FileDescriptor> map_fd = OpenDirectory(directory);
   if (!map_fd) return map_fd.error();
@@ -80,14 +86,14 @@ Status WriteFiles(const std::string& directory, const MapManifest& manifest,
   if (!tiles_fd) return tiles_fd.error();
   for (size_t i = 0; i < kNumTileKinds; ++i) {
     const std::string& name = manifest.tiles[i].file;
-    if (Status status = WriteNewFileAt(*tiles_fd, name, tiles[i], tiles_path + "/" + name);
+    if (Status status = WriteNewFileAt(*tiles_fd, name, tiles[i], Inside(tiles_path, name));
         !status) {
       return status;
     }
   }
   if (Status status = SyncDirectory(*tiles_fd, tiles_path); !status) return status;
   if (Status status = WriteNewFileAt(*map_fd, kManifestName, WriteManifest(manifest),
-                                     directory + "/" + kManifestName);
+                                     Inside(directory, kManifestName));
       !status) {
     return status;
   }
@@ -133,15 +139,15 @@ Status Publish(const std::string& temporary, const std::string& target, bool ove
 
 Result<MapTiles> ReadTiles(const FileDescriptor& map_fd, const MapManifest& manifest,
                            const std::string& directory) {
-  const std::string tiles_path = directory + "/" + kTilesName;
+  const std::string tiles_path = Inside(directory, kTilesName);
   const Result<FileDescriptor> tiles_fd = OpenDirectoryAt(map_fd, kTilesName, tiles_path);
-  if (!tiles_fd) return Inside(tiles_fd.error());
+  if (!tiles_fd) return AsCorrupt(tiles_fd.error());
   MapTiles tiles;
   for (size_t i = 0; i < kNumTileKinds; ++i) {
     const TileEntry& entry = manifest.tiles[i];
-    const std::string path = tiles_path + "/" + entry.file;
+    const std::string path = Inside(tiles_path, entry.file);
     Result<std::string> content = ReadFileAt(*tiles_fd, entry.file, entry.bytes, path);
-    if (!content) return Inside(content.error());
+    if (!content) return AsCorrupt(content.error());
     if (content->size() != entry.bytes || Checksum(*content) != entry.xxh3) {
       return Error{ErrorCode::kCorruptData, path + " does not match its checksum"};
     }
@@ -191,7 +197,7 @@ Status WriteMap(const LineMap& map, const std::string& directory, const WriteMap
 Result<LineMap> ReadMap(const std::string& directory) {
   const Result<FileDescriptor> map_fd = OpenDirectory(directory);
   if (!map_fd) return map_fd.error();
-  const std::string manifest_path = directory + "/" + kManifestName;
+  const std::string manifest_path = Inside(directory, kManifestName);
   const Result<std::string> text =
       ReadFileAt(*map_fd, kManifestName, kMaxManifestBytes, manifest_path);
   if (!text) return text.error();

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cstddef>
 #include <opencv2/calib3d.hpp>
 
 #include "plumb/geometry/line_projection.h"

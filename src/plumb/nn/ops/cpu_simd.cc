@@ -12,26 +12,8 @@
 namespace plumb::nn {
 namespace {
 
-constexpr int kBlock = 8;                       // Pixels of a block.
-constexpr uint32_t kOutsideTexel = 0x3fff0000;  // Beyond every texel buffer; reads as zero.
-constexpr int kTileRows = 4;                    // Rows that a lane of the Winograd kernel makes.
-constexpr int kLanes = 8;                       // Blocks of a workgroup.
 constexpr int kWeightGroup = 32;                // Weights of one fetch.
-
-int RoundUp(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
-
-int Blocks(const Feature& feature) {
-  return feature.height * (RoundUp(feature.width, kBlock) / kBlock);
-}
-
-// Workgroups of the Winograd kernel, whose lanes own 4 rows of a block.
-int WinogradGroupsOf(const Feature& feature) {
-  const int tiles =
-      RoundUp(feature.height, kTileRows) / kTileRows * (RoundUp(feature.width, kBlock) / kBlock);
-  return RoundUp(tiles, kLanes) / kLanes;
-}
-
-int GroupsOf(const Feature& feature) { return RoundUp(Blocks(feature), kLanes) / kLanes; }
+constexpr uint32_t kOutsideTexel = 0x3fff0000;  // Beyond every texel buffer; reads as zero.
 
 // Most inputs that one kernel holds on its stack; more go through partial sums.
 int MaxInputs(Taps taps) {
@@ -110,14 +92,14 @@ class Planner {
 
   void MaxPool(const Layer& layer) {
     const Feature& out = At(layer.output);
-    const int split = SplitOutputs(GroupsOf(out), out.channels);
+    const int split = SplitOutputs(P8Groups(out), out.channels);
     DispatchInfo dispatch;
     dispatch.name = layer.name;
     dispatch.shader = "nn/p8_max_pool";
     dispatch.spec_constants = Spec({out.channels});
     dispatch.push = {static_cast<uint32_t>(out.width)};
     dispatch.operands = {Texels(layer.input), Output(layer.output)};
-    dispatch.groups = {static_cast<uint32_t>(GroupsOf(out)), static_cast<uint32_t>(split), 1};
+    dispatch.groups = {static_cast<uint32_t>(P8Groups(out)), static_cast<uint32_t>(split), 1};
     plan_.dispatches.push_back(std::move(dispatch));
   }
 
@@ -141,7 +123,7 @@ class Planner {
       }
       row[kTaps * kInputPlanes] = layer.bias[o];
     }
-    dispatch.groups = {static_cast<uint32_t>(GroupsOf(out)), 1, 1};
+    dispatch.groups = {static_cast<uint32_t>(P8Groups(out)), 1, 1};
     plan_.dispatches.push_back(std::move(dispatch));
   }
 
@@ -154,7 +136,7 @@ class Planner {
                           layer.output != layers_.output;
     const int most = winograd ? kMaxWinogradInputs : MaxInputs(layer.taps);
     const int parts = (total + most - 1) / most;
-    const int step = RoundUp((total + parts - 1) / parts, 4);
+    const int step = P8RoundUp((total + parts - 1) / parts, 4);
     int partial = -1;
     for (int begin = 0; begin < total; begin += step) {
       const int end = std::min(total, begin + step);
@@ -176,7 +158,7 @@ class Planner {
   void WinogradPart(const Layer& layer, int begin, int end, int partial, int target) {
     const Feature& in = At(layer.input);
     const Feature& out = At(layer.output);
-    const int groups = WinogradGroupsOf(out);
+    const int groups = P8TileGroups(out);
     const int split = SplitOutputs(groups, out.channels);
     const bool last = target == layer.output;
     DispatchInfo dispatch;
@@ -204,7 +186,7 @@ class Planner {
   std::vector<float> PackWinograd(const Layer& layer, int begin, int end, bool with_bias) const {
     const int outputs = At(layer.output).channels, total = At(layer.input).channels;
     const int inputs = end - begin;
-    const int row = RoundUp(kWinogradPositions * inputs + 1, kWeightGroup);
+    const int row = P8RoundUp(kWinogradPositions * inputs + 1, kWeightGroup);
     std::vector<float> packed(static_cast<size_t>(outputs) * row, 0.0f);
     for (int o = 0; o < outputs; ++o) {
       float* to = &packed[static_cast<size_t>(o) * row];
@@ -244,7 +226,7 @@ class Planner {
     const bool upsampled = layer.upsampled >= 0 && first;
     const bool planar = target == layers_.output;
     const bool prologue = !layer.prologue_scale.empty() && in_end > in_first;
-    const int groups = GroupsOf(out);
+    const int groups = P8Groups(out);
     const int split = SplitOutputs(groups, out.channels);
 
     DispatchInfo dispatch;
@@ -274,7 +256,7 @@ class Planner {
     const int outputs = At(layer.output).channels;
     const int taps = static_cast<int>(TapOffsets(layer.taps).size());
     const int total = static_cast<int>(layer.weights.size()) / (outputs * taps);
-    const int row = RoundUp(taps * (end - begin) + 1, kWeightGroup);
+    const int row = P8RoundUp(taps * (end - begin) + 1, kWeightGroup);
     std::vector<float> packed(static_cast<size_t>(outputs) * row, 0.0f);
     for (int o = 0; o < outputs; ++o) {
       float* to = &packed[static_cast<size_t>(o) * row];
@@ -289,7 +271,7 @@ class Planner {
     for (const std::vector<float>* values : {&layer.prologue_scale, &layer.prologue_shift}) {
       if (prologue_end <= prologue_begin) break;
       const size_t at = packed.size();
-      packed.resize(at + RoundUp(prologue_end - prologue_begin, kWeightGroup), 0.0f);
+      packed.resize(at + P8RoundUp(prologue_end - prologue_begin, kWeightGroup), 0.0f);
       std::copy(values->begin() + prologue_begin, values->begin() + prologue_end,
                 packed.begin() + at);
     }
@@ -323,7 +305,7 @@ CpuSimdOptions ChooseCpuSimdOptions(const gpu::DeviceInfo& device) {
 }
 
 std::string MissingForCpuSimd(const gpu::DeviceInfo& device) {
-  if (device.subgroup_size != kLanes) {
+  if (device.subgroup_size != kP8Lanes) {
     return "subgroups of " + std::to_string(device.subgroup_size) + " instead of 8 lanes";
   }
   if (!device.subgroup_shuffle) return "no subgroup shuffle";
@@ -334,42 +316,6 @@ std::string MissingForCpuSimd(const gpu::DeviceInfo& device) {
 
 DispatchPlan PlanCpuSimd(const LayerPlan& plan, const CpuSimdOptions& options) {
   return Planner(plan, options).Plan();
-}
-
-size_t P8Size(const Feature& feature) {
-  Feature padded = feature;
-  padded.height = RoundUp(feature.height, kTileRows);
-  return static_cast<size_t>(GroupsOf(padded)) * kLanes * feature.channels * kBlock;
-}
-
-std::vector<float> PlanarToP8(const Feature& feature, std::span<const float> planar) {
-  std::vector<float> p8(P8Size(feature), 0.0f);
-  const int blocks = RoundUp(feature.width, kBlock) / kBlock;
-  for (int c = 0; c < feature.channels; ++c) {
-    for (int y = 0; y < feature.height; ++y) {
-      for (int x = 0; x < feature.width; ++x) {
-        const size_t block = static_cast<size_t>(y) * blocks + x / kBlock;
-        p8[(block * feature.channels + c) * kBlock + x % kBlock] =
-            planar[(static_cast<size_t>(c) * feature.height + y) * feature.width + x];
-      }
-    }
-  }
-  return p8;
-}
-
-std::vector<float> P8ToPlanar(const Feature& feature, std::span<const float> p8) {
-  std::vector<float> planar(static_cast<size_t>(feature.channels) * feature.height * feature.width);
-  const int blocks = RoundUp(feature.width, kBlock) / kBlock;
-  for (int c = 0; c < feature.channels; ++c) {
-    for (int y = 0; y < feature.height; ++y) {
-      for (int x = 0; x < feature.width; ++x) {
-        const size_t block = static_cast<size_t>(y) * blocks + x / kBlock;
-        planar[(static_cast<size_t>(c) * feature.height + y) * feature.width + x] =
-            p8[(block * feature.channels + c) * kBlock + x % kBlock];
-      }
-    }
-  }
-  return planar;
 }
 
 }  // namespace plumb::nn

@@ -109,6 +109,7 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
   const GateEvidence evidence{
       .refined = MeasureSupport(input.camera, refined),
       .prior = MeasureSupport(input.camera, prior),
+      .is_near_prior = IsPlausible(refined, input.prior),
       .num_pairs = observations_.size(),
       .num_observed_directions = CountObservedDirections(
           terms.equations.information / std::max(terms.residual_scale, 1.0), input.prior)};

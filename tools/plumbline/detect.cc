@@ -8,6 +8,7 @@
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/detector_choice.h"
+#include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 
 namespace plumb::tools {
@@ -43,6 +44,7 @@ Outcome RunDetect(const DetectOptions& options) {
   {
     ProgressBar progress("detect", options.images.size());
     for (const std::string& path : options.images) {
+      if (Outcome interrupted = CheckInterrupt()) return interrupted;
       const Result<cv::Mat> image = ReadColorImage(path);
       if (!image) return FailureFrom(image.error());
       const ImageView view = ViewOf(*image);
@@ -55,7 +57,7 @@ Outcome RunDetect(const DetectOptions& options) {
       progress.Advance();
     }
   }
-  if (options.json) return PrintJson(report);
+  if (options.json) return PrintJson(report, JsonLayout::kCompact);
   std::string text;
   for (const Json& image : report) {
     text += image["file"].get<std::string>() + ": " + std::to_string(image["lines"].size()) +

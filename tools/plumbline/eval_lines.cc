@@ -12,6 +12,7 @@
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/detector_choice.h"
+#include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 
 namespace plumb::tools {
@@ -34,6 +35,7 @@ Outcome RunEvalLines(const EvalLinesOptions& options) {
   {
     ProgressBar progress("eval lines", (*annotated).size());
     for (const AnnotatedImage& entry : *annotated) {
+      if (Outcome interrupted = CheckInterrupt()) return interrupted;
       const Result<cv::Mat> image = ReadColorImage(entry.path);
       if (!image) return FailureFrom(image.error());
       const ImageView view = ViewOf(*image);

@@ -19,6 +19,8 @@ enum ExitCode : int {
   kExitCannotCreate = 73,  // an output cannot be created
   kExitIo = 74,            // reading or writing failed half-way
   kExitTryAgain = 75,      // the device was lost
+  kExitInterrupted = 130,  // SIGINT
+  kExitTerminated = 143,   // SIGTERM
 };
 
 /// Why a command stopped: one sentence that names the object and the value.

@@ -11,6 +11,7 @@
 #include "tools/datasets/timestamp.h"
 #include "tools/datasets/trajectory.h"
 #include "tools/plumbline/console.h"
+#include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/point_front_end.h"
 
 namespace plumb::tools {
@@ -192,6 +193,7 @@ Outcome RunFrames(FrameRun* run, const FrameSink& sink) {
   ResultPump pump(*run, &session, sink);
   PointFrontEnd point_front_end;
   for (size_t i = 0; i < run->frames.size(); ++i) {
+    if (Outcome interrupted = CheckInterrupt()) return interrupted;
     const SequenceFrame& frame = run->frames[i];
     const Result<cv::Mat> image =
         run->images.empty() ? ReadColorImage(frame.color_path) : Result<cv::Mat>(run->images[i]);

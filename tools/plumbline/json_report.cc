@@ -16,9 +16,10 @@ double Rounded(double value, int decimals) {
   return std::round(value * scale) / scale;
 }
 
-Outcome PrintJson(const Json& json) {
+Outcome PrintJson(const Json& json, JsonLayout layout) {
   // File names need not be UTF-8; what is not becomes a replacement character.
-  return PrintText(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  const int indent = layout == JsonLayout::kCompact ? -1 : 1;
+  return PrintText(json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 Outcome PrintText(const std::string& text) {

@@ -18,8 +18,13 @@ Json NewReport(const std::string& kind);
 /// `value` rounded to `decimals`, so that documents stay readable; NaN becomes null in JSON.
 double Rounded(double value, int decimals);
 
+enum class JsonLayout {
+  kIndented,  // for people, too
+  kCompact,   // for long lists of numbers
+};
+
 /// Prints the document alone on stdout.
-Outcome PrintJson(const Json& json);
+Outcome PrintJson(const Json& json, JsonLayout layout = JsonLayout::kIndented);
 
 /// Prints text for people on stdout.
 Outcome PrintText(const std::string& text);

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,12 +10,14 @@
 #include "plumb/features/segment_refiner.h"
 #include "plumb/map/map_builder.h"
 #include "plumb/map/map_file.h"
+#include "plumb/runtime/covariance_calibration.h"
 #include "tools/datasets/image_file.h"
 #include "tools/datasets/timestamp.h"
 #include "tools/datasets/tum_sequence.h"
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/detector_choice.h"
+#include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 #include "tools/plumbline/output_directory.h"
 #include "tools/plumbline/point_front_end.h"
@@ -26,6 +29,7 @@ struct MapBuildOptions {
   std::string sequence, frames, out;
   DetectorOptions detector;
   std::string points = "opencv";
+  bool calibrate = false;
   bool json = false;
 };
 
@@ -68,7 +72,14 @@ DepthView ViewOfDepth(const cv::Mat& depth, double depth_scale) {
   return view;
 }
 
-/// Detects, refines and lifts the segments of one key frame.
+/// A key frame with all that its KeyFrameInput borrows.
+struct LoadedKeyFrame {
+  cv::Mat depth;
+  std::vector<Segment2> segments;
+  KeyFrameInput input;
+};
+
+/// Reads the images of key frames, detects and refines their segments.
 class KeyFrameReader {
  public:
   KeyFrameReader(const TumSequence& sequence, LineDetector* detector, bool with_points)
@@ -77,33 +88,31 @@ class KeyFrameReader {
         with_points_(with_points),
         refiner_(SegmentRefinerOptions{}) {}
 
-  Outcome AddTo(MapBuilder* builder, const SequenceFrame& frame) {
+  Outcome Read(const SequenceFrame& frame, LoadedKeyFrame* out) {
+    const Camera& camera = sequence_.camera;
     const Result<cv::Mat> color = ReadColorImage(frame.color_path);
     if (!color) return FailureFrom(color.error());
-    if (Outcome failed = CheckSize(frame.color_path, *color, sequence_.camera)) return failed;
-    const Result<cv::Mat> depth = ReadDepthImage(*frame.depth_path);
+    if (Outcome failed = CheckSize(frame.color_path, *color, camera)) return failed;
+    Result<cv::Mat> depth = ReadDepthImage(*frame.depth_path);
     if (!depth) return FailureFrom(depth.error());
-    if (Outcome failed = CheckSize(*frame.depth_path, *depth, sequence_.camera)) return failed;
+    if (Outcome failed = CheckSize(*frame.depth_path, *depth, camera)) return failed;
+    out->depth = *std::move(depth);
 
     const ImageView view = ViewOf(*color);
     const Result<std::vector<Segment2>> raw = detector_->Detect(view);
     if (!raw) return FailureFrom(raw.error());
-    const std::vector<Segment2> segments = refiner_.Refine(view, *raw);
-    KeyFrameInput input;
+    out->segments = refiner_.Refine(view, *raw);
+    KeyFrameInput& input = out->input;
     input.timestamp_ns = frame.timestamp_ns;
     input.cam_from_world = *frame.cam_from_world;
-    input.camera = sequence_.camera;
-    input.segments = segments;
-    input.depth = ViewOfDepth(*depth, sequence_.depth_scale);
-    if (with_points_) {
-      Result<std::vector<MapPoint>> points = point_front_end_.KeyFramePoints(
-          *color, sequence_.camera, *frame.cam_from_world, input.depth);
-      if (!points) return FailureFrom(points.error());
-      input.points = *std::move(points);
-    }
-    if (const Status added = builder->AddKeyFrame(std::move(input)); !added) {
-      return Failure{kExitBadData, added.error().message};
-    }
+    input.camera = camera;
+    input.segments = out->segments;
+    input.depth = ViewOfDepth(out->depth, sequence_.depth_scale);
+    if (!with_points_) return std::nullopt;
+    Result<std::vector<MapPoint>> points =
+        point_front_end_.KeyFramePoints(*color, camera, input.cam_from_world, input.depth);
+    if (!points) return FailureFrom(points.error());
+    input.points = *std::move(points);
     return std::nullopt;
   }
 
@@ -113,6 +122,43 @@ class KeyFrameReader {
   bool with_points_;
   SegmentRefiner refiner_;
   PointFrontEnd point_front_end_;
+};
+
+/// A second map without every fifth key frame, on which those show how large the errors are.
+class Calibrator {
+ public:
+  explicit Calibrator(const MapBuilderOptions& options) : builder_(options) {}
+
+  Outcome Add(const LoadedKeyFrame& frame) {
+    if (++num_frames_ % 5 == 0) {
+      held_out_.push_back({frame.input.camera, frame.input.cam_from_world, frame.segments});
+      return std::nullopt;
+    }
+    KeyFrameInput input = frame.input;
+    input.points.clear();
+    const Status added = builder_.AddKeyFrame(std::move(input));
+    return added ? Outcome() : Failure{kExitBadData, added.error().message};
+  }
+
+  /// The factor stays as it is when too few of the left-out frames could be refined.
+  Outcome Calibrate(double* factor) {
+    const Result<LineMap> map = builder_.Build();
+    if (!map) return FailureFrom(map.error());
+    const auto calibration = CalibrateCovariance(*map, held_out_, PoseRefinerOptions{});
+    if (!calibration) return FailureFrom(calibration.error());
+    if (calibration->num_refined < kMinCalibrationFrames) {
+      PrintRemark(
+          "--calibrate: only " + std::to_string(calibration->num_refined) +
+          " of the left-out key frames could be refined, the covariance stays uncalibrated");
+    }
+    *factor = calibration->factor;
+    return std::nullopt;
+  }
+
+ private:
+  MapBuilder builder_;
+  size_t num_frames_ = 0;
+  std::vector<HeldOutFrame> held_out_;
 };
 
 Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, double seconds) {
@@ -150,11 +196,21 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   MapBuilderOptions builder_options;
   builder_options.detector = detector->Name();
   MapBuilder builder(builder_options);
+  std::optional<Calibrator> calibrator;
+  if (options.calibrate) calibrator.emplace(builder_options);
   {
     KeyFrameReader reader(sequence, detector.get(), options.points == "opencv");
     ProgressBar progress("key frames", frames.size());
     for (const SequenceFrame& frame : frames) {
-      if (Outcome failed = reader.AddTo(&builder, frame)) return failed;
+      if (Outcome interrupted = CheckInterrupt()) return interrupted;
+      LoadedKeyFrame loaded;
+      if (Outcome failed = reader.Read(frame, &loaded)) return failed;
+      if (calibrator) {
+        if (Outcome failed = calibrator->Add(loaded)) return failed;
+      }
+      if (const Status added = builder.AddKeyFrame(std::move(loaded.input)); !added) {
+        return Failure{kExitBadData, added.error().message};
+      }
       progress.Advance();
     }
   }
@@ -166,6 +222,9 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
     });
   }();
   if (!map) return FailureFrom(map.error());
+  if (calibrator) {
+    if (Outcome failed = calibrator->Calibrate(&map->covariance_factor)) return failed;
+  }
   WriteMapOptions write_options;
   write_options.overwrite = true;
   if (const Status written = WriteMap(*map, options.out, write_options); !written) {
@@ -199,6 +258,9 @@ void AddMapBuild(CLI::App& map, PendingRun& pending) {
                         "opencv: keep SIFT points of every key frame for replay --points; or none")
             ->check(CLI::IsMember({"none", "opencv"}))
             ->capture_default_str();
+        command.add_flag(
+            "--calibrate", options.calibrate,
+            "Calibrate the covariance on every fifth key frame, left out of a second map");
         command.add_flag("--json", options.json, "Print what was built as JSON");
         command.footer(
             "Examples:\n"

@@ -5,6 +5,7 @@
 
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
+#include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 
 namespace plumb::tools {
@@ -12,7 +13,8 @@ namespace {
 
 constexpr const char* kFooter =
     "Exit codes: 0 ok, 64 usage, 65 bad data, 66 input missing, 69 no usable device,\n"
-    "70 internal error, 73 output cannot be created, 74 I/O error, 75 device lost.\n"
+    "70 internal error, 73 output cannot be created, 74 I/O error, 75 device lost,\n130 or 143 "
+    "interrupted.\n"
     "Data goes to stdout (with --json one JSON document alone), remarks to stderr.";
 
 /// A command that only groups others.
@@ -62,6 +64,7 @@ int RunProgram(int argc, const char* const* argv) {
     if (e.get_exit_code() == 0) return program.exit(e) == 0 ? kExitOk : kExitUsage;
     return Fail({kExitUsage, std::string(e.what()) + " (try --help)"});
   }
+  NoteInterrupts();
   try {
     const Outcome failed = pending();
     return failed ? Fail(*failed) : static_cast<int>(kExitOk);

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <cstdlib>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include <sys/wait.h>
@@ -16,13 +14,6 @@ struct ProgramRun {
   int exit_code = -1;  // -1: killed by a signal
   std::string out, err;
 };
-
-inline std::string ReadAll(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  if (file.peek() != std::ifstream::traits_type::eof()) bytes << file.rdbuf();
-  return bytes.str();
-}
 
 /// `arguments` as typed in a shell; paths must not need quoting.
 inline ProgramRun RunPlumbline(const std::string& arguments) {

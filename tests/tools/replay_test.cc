@@ -105,6 +105,24 @@ TEST_F(Replay, MapInfoCountsWhatWasBuilt) {
   EXPECT_GT(info["points"].get<int>(), 20);
 }
 
+TEST_F(Replay, CalibrationOnTooFewKeyFramesSaysSo) {
+  const ProgramRun run = RunPlumbline(BuildArguments(room_->path()) +
+                                      " --points none --calibrate --out " + (dir_ / "map"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("uncalibrated"));
+  const json info = json::parse(RunPlumbline("map info " + (dir_ / "map") + " --json").out);
+  EXPECT_EQ(info["covariance_factor"].get<double>(), 1.0);
+  EXPECT_EQ(info["points"], 0);
+}
+
+TEST_F(Replay, PointsNeedAMapWithPoints) {
+  const ProgramRun built =
+      RunPlumbline(BuildArguments(room_->path()) + " --points none --out " + (dir_ / "map"));
+  ASSERT_EQ(built.exit_code, 0) << built.err;
+  ExpectFailure(ReplayArguments(Priors(), dir_ / "map") + " --points opencv", 65,
+                "holds no points");
+}
+
 TEST_F(Replay, MapExportWritesPlyAndObj) {
   for (const auto& [name, begin] : {std::pair("lines.ply", "ply\n"), std::pair("lines.obj", "")}) {
     const ProgramRun run =

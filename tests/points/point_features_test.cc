@@ -17,7 +17,7 @@ using testing::TexturedCorner;
 
 constexpr Camera kCamera{260.0, 260.0, 159.5, 119.5, 320, 240};
 
-GrayView ViewOf(const RenderedView& view) {
+GrayImage ViewOf(const RenderedView& view) {
   return {view.gray.data(), view.camera.width_px, view.camera.width_px, view.camera.height_px};
 }
 DepthView DepthOf(const RenderedView& view) {

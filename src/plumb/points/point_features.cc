@@ -30,7 +30,7 @@ PointExtractor::~PointExtractor() = default;
 PointExtractor::PointExtractor(PointExtractor&&) noexcept = default;
 PointExtractor& PointExtractor::operator=(PointExtractor&&) noexcept = default;
 
-Status PointExtractor::Extract(const GrayView& image, ImagePoints* out_points) {
+Status PointExtractor::Extract(const GrayImage& image, ImagePoints* out_points) {
   out_points->pixels.clear();
   out_points->descriptors.clear();
   const bool has_size = image.width_px >= kMinSide && image.height_px >= kMinSide &&

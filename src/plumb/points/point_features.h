@@ -13,7 +13,7 @@
 namespace plumb {
 
 /// Borrowed 8-bit image; the data must outlive the call that takes the view.
-struct GrayView {
+struct GrayImage {
   const uint8_t* data = nullptr;
   int64_t row_stride_bytes = 0;
   int width_px = 0, height_px = 0;
@@ -45,7 +45,7 @@ class PointExtractor {
   /// Deterministic: the order is the detector's, by place.
   /// @return kInvalidArgument when the image is smaller than 16 x 16 or its rows overlap.
   /// Source: Lowe, IJCV 2004, as OpenCV implements it.
-  Status Extract(const GrayView& image, ImagePoints* out_points);
+  Status Extract(const GrayImage& image, ImagePoints* out_points);
 
  private:
   struct Impl;

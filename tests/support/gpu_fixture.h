@@ -23,20 +23,27 @@ namespace plumb::testing {
 #define PLUMB_EXPECT_OK(result) \
   EXPECT_TRUE((result).has_value()) << ((result).has_value() ? "" : (result).error().message)
 
-/// Opens the device once per test program, with validation; one message of the layer fails the
-/// test during which it came. Skips, visibly, only where there is no Vulkan device at all.
+/// Opens the device once per test suite, with validation; one message of the layer fails the
+/// test during which it came. Skips, visibly, only where there is no Vulkan device at all. The
+/// device goes with the suite: a device that lives until the program's static objects die makes
+/// newer validation layers crash there.
 class GpuTest : public ::testing::Test {
  protected:
   void SetUp() override {
     static const Result<std::vector<gpu::DeviceInfo>> devices = gpu::ListDevices();
     if (!devices) GTEST_SKIP() << devices.error().message;
     if ((*devices).empty()) GTEST_SKIP() << "no Vulkan device";
-    static Result<std::shared_ptr<gpu::Device>> device =
-        gpu::Device::Create({.selector = "auto", .validation = true});
-    PLUMB_ASSERT_OK(device);
-    device_ = *device;
+    if (shared_device_ == nullptr) {
+      Result<std::shared_ptr<gpu::Device>> device =
+          gpu::Device::Create({.selector = "auto", .validation = true});
+      PLUMB_ASSERT_OK(device);
+      shared_device_ = *std::move(device);
+    }
+    device_ = shared_device_;
     device_->ClearValidationMessages();
   }
+
+  static void TearDownTestSuite() { shared_device_.reset(); }
 
   void TearDown() override {
     if (device_ == nullptr) return;
@@ -66,6 +73,9 @@ class GpuTest : public ::testing::Test {
   }
 
   std::shared_ptr<gpu::Device> device_;
+
+ private:
+  inline static std::shared_ptr<gpu::Device> shared_device_;
 };
 
 }  // namespace plumb::testing

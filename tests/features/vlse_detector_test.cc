@@ -73,7 +73,10 @@ class VlseDetectorTest : public testing::GpuTest {
     PLUMB_ASSERT_OK(detector);
     detector_ = std::move(*detector);
   }
-  static void TearDownTestSuite() { detector_.reset(); }
+  static void TearDownTestSuite() {
+    detector_.reset();
+    GpuTest::TearDownTestSuite();
+  }
 
   std::vector<Segment2> Detect(const ImageView& image) {
     Result<std::vector<Segment2>> segments = detector_->Detect(image);

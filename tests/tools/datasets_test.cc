@@ -294,9 +294,37 @@ TEST(LineAnnotations, RefuseBrokenEntries) {
         R"([{"filename": "a", "width": 0, "height": 1, "lines": []}])",
         R"([{"filename": "a", "width": 1, "height": 1}])",
         R"([{"filename": "a", "width": 1, "height": 1, "lines": [[1, 2, 3]]}])",
-        R"([{"filename": "a", "width": 1, "height": 1, "lines": [[1, 2, 3, null]]}])"}) {
+        R"([{"filename": "a", "width": 1, "height": 1, "lines": [[1, 2, 3, null]]}])",
+        R"([{"filename": "a", "width": 1, "height": 1, "lines": [[1, 2, 3, 1e300]]}])"}) {
     dir.Write("annotations.json", json);
     EXPECT_EQ(ReadLineAnnotations(dir.path()).error().code, ErrorCode::kCorruptData) << json;
+  }
+}
+
+TEST(Detections, AreReadInTheImagesOrder) {
+  const TemporaryDirectory dir;
+  const std::string path =
+      dir.Write("found.json", R"([{"file": "other/b.jpg", "lines": [[1, 2, 3, 4], [5, 6, 7, 8]],
+                         "scores": [0.5, 0.25]}, {"file": "a.jpg", "lines": [], "scores": []}])");
+  const auto read = ReadDetections(path, {{"x/a.jpg", 9, 9, {}}, {"x/b.jpg", 9, 9, {}}});
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_TRUE((*read)[0].empty());
+  ASSERT_EQ((*read)[1].size(), 2u);
+  EXPECT_EQ((*read)[1][1].end, Eigen::Vector2d(7, 8));
+  EXPECT_DOUBLE_EQ((*read)[1][1].score, 0.25);
+}
+
+TEST(Detections, RefuseBrokenEntriesAndMissingImages) {
+  const TemporaryDirectory dir;
+  for (const char* json :
+       {"{", "[]", R"([{"lines": [], "scores": []}])", R"([{"file": "a", "lines": []}])",
+        R"([{"file": "a", "lines": [[1, 2, 3]], "scores": [1]}])",
+        R"([{"file": "a", "lines": [[1, 2, 3, 4]], "scores": []}])",
+        R"([{"file": "a", "lines": [[1, 2, 3, 4]], "scores": ["1"]}])",
+        R"([{"file": "b", "lines": [], "scores": []}])"}) {
+    const std::string path = dir.Write("found.json", json);
+    EXPECT_EQ(ReadDetections(path, {{"a", 9, 9, {}}}).error().code, ErrorCode::kCorruptData)
+        << json;
   }
 }
 

@@ -46,18 +46,28 @@ void JudgeImage(const LineEvaluation& image, double threshold, std::vector<Judge
   }
 }
 
+/// All detections, best score first, and the number of lines that they could hit.
+struct Ranking {
+  std::vector<Judged> judged;
+  double num_annotated = 0.0;
+};
+
+Ranking Rank(std::span<const LineEvaluation> images, double threshold) {
+  Ranking ranking;
+  for (const LineEvaluation& image : images) {
+    ranking.num_annotated += static_cast<double>(image.annotated.size());
+    JudgeImage(image, threshold, &ranking.judged);
+  }
+  std::stable_sort(ranking.judged.begin(), ranking.judged.end(),
+                   [](const Judged& a, const Judged& b) { return a.score > b.score; });
+  return ranking;
+}
+
 }  // namespace
 
 double StructuralAp(std::span<const LineEvaluation> images, double threshold) {
-  size_t num_annotated = 0;
-  std::vector<Judged> judged;
-  for (const LineEvaluation& image : images) {
-    num_annotated += image.annotated.size();
-    JudgeImage(image, threshold, &judged);
-  }
-  if (num_annotated == 0) return 0.0;
-  std::stable_sort(judged.begin(), judged.end(),
-                   [](const Judged& a, const Judged& b) { return a.score > b.score; });
+  const auto [judged, num_annotated] = Rank(images, threshold);
+  if (num_annotated == 0.0) return 0.0;
   std::vector<double> precision(judged.size());
   double num_hits = 0.0;
   for (size_t i = 0; i < judged.size(); ++i) {
@@ -71,7 +81,27 @@ double StructuralAp(std::span<const LineEvaluation> images, double threshold) {
     envelope = std::max(envelope, precision[i]);
     if (judged[i].hit) area += envelope;
   }
-  return 100.0 * area / static_cast<double>(num_annotated);
+  return 100.0 * area / num_annotated;
+}
+
+std::vector<OperatingPoint> StructuralCurve(std::span<const LineEvaluation> images,
+                                            double threshold) {
+  const auto [judged, num_annotated] = Rank(images, threshold);
+  std::vector<OperatingPoint> curve(101);
+  size_t count = 0;
+  double num_hits = 0.0;
+  for (int step = 100; step >= 0; --step) {
+    OperatingPoint& point = curve[step];
+    point.min_score = step / 100.0;
+    for (; count < judged.size() && judged[count].score >= point.min_score; ++count) {
+      num_hits += judged[count].hit ? 1.0 : 0.0;
+    }
+    point.precision = count > 0 ? num_hits / static_cast<double>(count) : 1.0;
+    point.recall = num_annotated > 0.0 ? num_hits / num_annotated : 0.0;
+    const double sum = point.precision + point.recall;
+    point.f = sum > 0.0 ? 2.0 * point.precision * point.recall / sum : 0.0;
+  }
+  return curve;
 }
 
 }  // namespace plumb::tools

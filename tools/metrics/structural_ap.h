@@ -23,4 +23,14 @@ struct LineEvaluation {
 /// Source: Zhou et al., "End-to-End Wireframe Parsing", ICCV 2019, Sec. 4.3.
 double StructuralAp(std::span<const LineEvaluation> images, double threshold);
 
+/// What keeping only the detections with at least this score would give.
+struct OperatingPoint {
+  double min_score = 0.0;
+  double precision = 0.0, recall = 0.0, f = 0.0;  // 0..1; precision 1 where nothing is left
+};
+
+/// Precision and recall of the same hits for the score thresholds 0.00, 0.01 .. 1.00.
+std::vector<OperatingPoint> StructuralCurve(std::span<const LineEvaluation> images,
+                                            double threshold);
+
 }  // namespace plumb::tools

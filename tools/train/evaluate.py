@@ -1,4 +1,4 @@
-"""sAP of a weights file or training state on a folder with images/ and annotations.json.
+"""sAP and pixel metrics of a weights file or training state on a folder with images/ and annotations.json.
 
 usage: evaluate.py WEIGHTS DIR [--size N] [--score-threshold X] [--top-k N] [--nms-decay X] [--detections OUT.json]
 """
@@ -12,6 +12,7 @@ import torch
 
 import weights_file
 from model import MEAN, STD, STRIDE
+from pixel_ap import pixel_metrics
 from sap import sap
 from targets import clip_lines, decode
 
@@ -35,7 +36,7 @@ def detect(model, images, size, displacement_scale=DISPLACEMENT_SCALE, top_k=TOP
     results = []
     for start in range(0, len(images), batch):
         chunk = images[start : start + batch]
-        x = to_tensor(np.stack([cv2.resize(i, (size, size), interpolation=cv2.INTER_LINEAR) for i in chunk])).to(device)
+        x = to_tensor(np.stack([cv2.resize(np.float32(i), (size, size), interpolation=cv2.INTER_LINEAR) for i in chunk])).to(device)
         maps = model(x).float()
         p = torch.sigmoid(maps[:, 1] - maps[:, 0]).cpu().numpy()
         offset = torch.sigmoid(maps[:, 2:4]).cpu().numpy()
@@ -90,7 +91,9 @@ def main():
         model, annotated, size, displacement_scale=float(metadata["displacement_scale"]), top_k=int(chosen["top_k"]),
         nms_decay=chosen["nms_decay"], threshold=chosen["score_threshold"],
     )
-    print(json.dumps({"sAP5": values[0], "sAP10": values[1], "sAP15": values[2], "images": len(annotated), "size": size}))
+    pixels = pixel_metrics(detections, [t for _, _, t in annotated], [(i.shape[1], i.shape[0]) for _, i, _ in annotated])
+    row = {"sAP5": values[0], "sAP10": values[1], "sAP15": values[2], "FH": pixels[0], "APH": pixels[1]}
+    print(json.dumps({**row, "images": len(annotated), "size": size}))
     if args.detections:
         rows = [
             {"file": n, "width": i.shape[1], "height": i.shape[0], "lines": l.tolist(), "scores": s.tolist()}

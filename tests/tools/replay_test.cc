@@ -315,5 +315,23 @@ TEST_F(Replay, EvalNeedsARunAndMatchingTruth) {
   EXPECT_THAT(apart.err, HasSubstr("truth.txt"));
 }
 
+TEST_F(Replay, RepeatabilityOfARenderedRoomIsHigh) {
+  const std::string arguments = "eval repeatability --sequence " + room_->path() + " --frames " +
+                                (*room_ / "splits/map.txt") + " --model lsd --json --step ";
+  const ProgramRun run = RunPlumbline(arguments + "1");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_GE(report["pairs"].get<int>(), 2);
+  EXPECT_GT(report["refined"]["expected"].get<int>(), 50);
+  EXPECT_GT(report["refined"]["found_again"].get<double>(), 0.7);
+  EXPECT_LT(report["refined"]["error_px"]["median"].get<double>(), 0.2);
+  EXPECT_LE(report["refined"]["segments_per_view"].get<double>(),
+            report["raw"]["segments_per_view"].get<double>());
+  const ProgramRun too_far = RunPlumbline(arguments + std::to_string(kNumFrames));
+  EXPECT_EQ(too_far.exit_code, 65);
+  EXPECT_THAT(too_far.out, IsEmpty());
+  EXPECT_THAT(too_far.err, HasSubstr("later in the sequence"));
+}
+
 }  // namespace
 }  // namespace plumb::tools

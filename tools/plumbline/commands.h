@@ -10,6 +10,7 @@ void AddBenchNet(CLI::App& bench, PendingRun& pending);
 void AddDetect(CLI::App& program, PendingRun& pending);
 void AddDeviceList(CLI::App& device, PendingRun& pending);
 void AddEvalLines(CLI::App& eval, PendingRun& pending);
+void AddEvalRepeatability(CLI::App& eval, PendingRun& pending);
 void AddEvalTrajectory(CLI::App& eval, PendingRun& pending);
 void AddMapBuild(CLI::App& map, PendingRun& pending);
 void AddMapExport(CLI::App& map, PendingRun& pending);

@@ -12,8 +12,6 @@
 #include "plumb/map/map_file.h"
 #include "plumb/runtime/covariance_calibration.h"
 #include "tools/datasets/image_file.h"
-#include "tools/datasets/timestamp.h"
-#include "tools/datasets/tum_sequence.h"
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/detector_choice.h"
@@ -21,6 +19,7 @@
 #include "tools/plumbline/json_report.h"
 #include "tools/plumbline/output_directory.h"
 #include "tools/plumbline/point_front_end.h"
+#include "tools/plumbline/posed_frames.h"
 
 namespace plumb::tools {
 namespace {
@@ -32,45 +31,6 @@ struct MapBuildOptions {
   bool calibrate = false;
   bool json = false;
 };
-
-/// Poses and files of every key frame are checked before the work starts.
-Outcome SelectKeyFrames(const MapBuildOptions& options, TumSequence* out_sequence,
-                        std::vector<SequenceFrame>* out_frames) {
-  Result<TumSequence> sequence = ReadTumSequence(options.sequence);
-  if (!sequence) return FailureFrom(sequence.error());
-  Result<std::vector<SequenceFrame>> frames = SelectFrames(*sequence, options.frames);
-  if (!frames) return FailureFrom(frames.error());
-  for (const SequenceFrame& frame : *frames) {
-    if (!frame.cam_from_world) {
-      return Failure{kExitBadData, options.sequence + "/groundtruth.txt: no pose for frame " +
-                                       FormatTimestamp(frame.timestamp_ns)};
-    }
-  }
-  if (const Status exist = CheckFilesExist(*frames, true); !exist)
-    return FailureFrom(exist.error());
-  *out_sequence = *std::move(sequence);
-  *out_frames = *std::move(frames);
-  return std::nullopt;
-}
-
-Outcome CheckSize(const std::string& path, const cv::Mat& image, const Camera& camera) {
-  if (image.cols == camera.width_px && image.rows == camera.height_px) return std::nullopt;
-  return Failure{kExitBadData, path + ": is " + std::to_string(image.cols) + " x " +
-                                   std::to_string(image.rows) + ", camera.json says " +
-                                   std::to_string(camera.width_px) + " x " +
-                                   std::to_string(camera.height_px)};
-}
-
-DepthView ViewOfDepth(const cv::Mat& depth, double depth_scale) {
-  DepthView view;
-  view.format = DepthFormat::kUint16;
-  view.data = depth.data;
-  view.row_stride_bytes = static_cast<int64_t>(depth.step[0]);
-  view.width_px = depth.cols;
-  view.height_px = depth.rows;
-  view.metres_per_unit = 1.0 / depth_scale;
-  return view;
-}
 
 /// A key frame with all that its KeyFrameInput borrows.
 struct LoadedKeyFrame {
@@ -90,15 +50,11 @@ class KeyFrameReader {
 
   Outcome Read(const SequenceFrame& frame, LoadedKeyFrame* out) {
     const Camera& camera = sequence_.camera;
-    const Result<cv::Mat> color = ReadColorImage(frame.color_path);
-    if (!color) return FailureFrom(color.error());
-    if (Outcome failed = CheckSize(frame.color_path, *color, camera)) return failed;
-    Result<cv::Mat> depth = ReadDepthImage(*frame.depth_path);
-    if (!depth) return FailureFrom(depth.error());
-    if (Outcome failed = CheckSize(*frame.depth_path, *depth, camera)) return failed;
-    out->depth = *std::move(depth);
+    RgbdImages images;
+    if (Outcome failed = ReadRgbdImages(frame, camera, &images)) return failed;
+    out->depth = images.depth;
 
-    const ImageView view = ViewOf(*color);
+    const ImageView view = ViewOf(images.color);
     const Result<std::vector<Segment2>> raw = detector_->Detect(view);
     if (!raw) return FailureFrom(raw.error());
     out->segments = refiner_.Refine(view, *raw);
@@ -110,7 +66,7 @@ class KeyFrameReader {
     input.depth = ViewOfDepth(out->depth, sequence_.depth_scale);
     if (!with_points_) return std::nullopt;
     Result<std::vector<MapPoint>> points =
-        point_front_end_.KeyFramePoints(*color, camera, input.cam_from_world, input.depth);
+        point_front_end_.KeyFramePoints(images.color, camera, input.cam_from_world, input.depth);
     if (!points) return FailureFrom(points.error());
     input.points = *std::move(points);
     return std::nullopt;
@@ -189,7 +145,8 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   if (Outcome failed = CheckReplaceable(options.out, "manifest.json")) return failed;
   TumSequence sequence;
   std::vector<SequenceFrame> frames;
-  if (Outcome failed = SelectKeyFrames(options, &sequence, &frames)) return failed;
+  if (Outcome failed = SelectPosedFrames(options.sequence, options.frames, &sequence, &frames))
+    return failed;
   std::unique_ptr<LineDetector> detector;
   if (Outcome failed = CreateDetector(options.detector, &detector)) return failed;
 

@@ -33,6 +33,7 @@ void AddCommands(CLI::App& program, PendingRun& pending) {
   AddReplay(program, pending);
   CLI::App& eval = AddGroup(program, "eval", "Score detections or refined poses");
   AddEvalLines(eval, pending);
+  AddEvalRepeatability(eval, pending);
   AddEvalTrajectory(eval, pending);
   CLI::App& bench = AddGroup(program, "bench", "Measure speed");
   AddBenchNet(bench, pending);

@@ -9,7 +9,7 @@
 
 namespace plumb::tools {
 
-/// All bytes of a file.
+/// All bytes of a file or, unlike the library's ReadFile(), of a pipe.
 /// @return kNotFound if `path` is missing, a directory or not readable.
 Result<std::string> ReadFile(const std::string& path);
 

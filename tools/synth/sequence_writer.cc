@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "plumb/base/file.h"
 #include "plumb/geometry/camera.h"
 #include "tools/datasets/timestamp.h"
 #include "tools/datasets/trajectory.h"
@@ -40,14 +40,6 @@ constexpr std::array<PriorSize, 5> kPriorSizes = {{{"p02", 0.02, 0.5},
                                                    {"p10", 0.10, 2.0},
                                                    {"p20", 0.20, 4.0},
                                                    {"p40", 0.40, 8.0}}};
-
-Status WriteText(const fs::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) return Error{ErrorCode::kInternal, "cannot write " + path.string()};
-  return Ok();
-}
 
 Status WriteImage(const fs::path& path, const cv::Mat& image, const std::vector<int>& parameters) {
   try {
@@ -161,7 +153,7 @@ Status WritePoses(const SequenceOptions& options, const std::vector<StampedPose>
                      header + tools::FormatTumTrajectory(drift));
 
   for (const auto& [path, text] : files) {
-    if (const Status written = WriteText(path, text); !written) return written.error();
+    if (const Status written = WriteFileAtomically(path, text); !written) return written.error();
   }
   return Ok();
 }
@@ -257,7 +249,7 @@ Status WriteSequence(const SequenceOptions& options, const std::string& director
                                    {"camera.json", camera_json.dump(1) + "\n"},
                                    {"lines3d.txt", edges.SeenEdgesText()},
                                    {"annotations.json", edges.AnnotationsJson()}}) {
-    if (const Status written = WriteText(root / name, text); !written) return written.error();
+    if (const Status written = WriteFileAtomically(root / name, text); !written) return written.error();
   }
   return WritePoses(options, truth, root);
 }

@@ -5,14 +5,6 @@
 
 namespace plumb {
 
-uint64_t Random::Next() {
-  state_ += 0x9e3779b97f4a7c15u;
-  uint64_t z = state_;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
-
 float Random::Uniform() { return static_cast<float>(Next() >> 40) * 0x1p-24f; }
 
 uint32_t Random::Below(uint32_t count) {
@@ -29,6 +21,6 @@ Eigen::Vector3f Random::Normal3(float sigma) {
           radius[1] * std::cos(angle[1])};
 }
 
-uint64_t MixSeeds(uint64_t a, uint64_t b) { return Random(Random(a).Next() ^ b).Next(); }
+uint64_t MixSeeds(uint64_t a, uint64_t b) { return SplitMix64(SplitMix64(a).Next() ^ b).Next(); }
 
 }  // namespace plumb

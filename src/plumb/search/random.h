@@ -5,23 +5,21 @@
 
 #include <Eigen/Core>
 
+#include "plumb/base/split_mix64.h"
+
 namespace plumb {
 
-/// SplitMix64 (Steele, Lea, Flood 2014). Not for secrets.
-class Random {
+/// Draws in single precision, of which the search makes thousands a frame.
+class Random : public SplitMix64 {
  public:
-  explicit Random(uint64_t seed) : state_(seed) {}
+  using SplitMix64::SplitMix64;
 
-  uint64_t Next();
   /// Uniform in [0, 1), 24 bits.
   float Uniform();
   /// Uniform in 0..count - 1, count > 0.
   uint32_t Below(uint32_t count);
   /// Three independent normal numbers with the standard deviation `sigma` each (Box-Muller).
   Eigen::Vector3f Normal3(float sigma);
-
- private:
-  uint64_t state_;
 };
 
 /// One seed out of two, such that neighbouring pairs give unrelated draws.

@@ -6,11 +6,12 @@ import argparse
 import json
 import os
 
-import cv2
 import numpy as np
 import torch
+import torch.nn.functional as F
 
 import weights_file
+from images import read_all
 from model import MEAN, STD, STRIDE
 from pixel_ap import pixel_metrics
 from sap import sap
@@ -22,10 +23,16 @@ NMS_DECAY = 0.5  # sAP10 is 2 above that of 0, and 1 above 0.8's
 
 
 def to_tensor(images):
-    """RGB uint8 [N, H, W, 3] -> normalised float [N, 3, H, W] in channels-last memory."""
-    x = torch.from_numpy(np.ascontiguousarray(images)).permute(0, 3, 1, 2).float()
-    mean, std = (torch.tensor(v).view(1, 3, 1, 1) for v in (MEAN, STD))
+    """RGB 0..255 [N, H, W, 3], array or tensor -> normalised float [N, 3, H, W] in channels-last memory."""
+    x = torch.as_tensor(images).permute(0, 3, 1, 2).float()
+    mean, std = (torch.tensor(v, device=x.device).view(1, 3, 1, 1) for v in (MEAN, STD))
     return ((x - mean) / std).contiguous(memory_format=torch.channels_last)
+
+
+def resized(image, size, device):
+    """RGB uint8 [H, W, 3] -> float [size, size, 3], bilinear without antialiasing like the runtime."""
+    x = torch.from_numpy(image).to(device).permute(2, 0, 1)[None].float()
+    return F.interpolate(x, (size, size), mode="bilinear", align_corners=False)[0].permute(1, 2, 0)
 
 
 @torch.no_grad()
@@ -36,8 +43,7 @@ def detect(model, images, size, displacement_scale=DISPLACEMENT_SCALE, top_k=TOP
     results = []
     for start in range(0, len(images), batch):
         chunk = images[start : start + batch]
-        x = to_tensor(np.stack([cv2.resize(np.float32(i), (size, size), interpolation=cv2.INTER_LINEAR) for i in chunk])).to(device)
-        maps = model(x).float()
+        maps = model(to_tensor(torch.stack([resized(i, size, device) for i in chunk]))).float()
         p = torch.sigmoid(maps[:, 1] - maps[:, 0]).cpu().numpy()
         offset = torch.sigmoid(maps[:, 2:4]).cpu().numpy()
         dis = (maps[:, 4:6] * displacement_scale).cpu().numpy()
@@ -55,14 +61,8 @@ def load_annotated(folder):
     """[(name, RGB image, lines [N, 4] in pixels)] of a folder with images/ and annotations.json."""
     with open(os.path.join(folder, "annotations.json")) as f:
         annotations = json.load(f)
-    result = []
-    for a in annotations:
-        path = os.path.join(folder, "images", a["filename"])
-        image = cv2.imread(path, cv2.IMREAD_COLOR)
-        if image is None:
-            raise OSError(f"cannot read image {path}")
-        result.append((a["filename"], cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.asarray(a["lines"], float).reshape(-1, 4)))
-    return result
+    images = read_all([os.path.join(folder, "images", a["filename"]) for a in annotations])
+    return [(a["filename"], i, np.asarray(a["lines"], float).reshape(-1, 4)) for a, i in zip(annotations, images)]
 
 
 def score(model, annotated, size, **options):

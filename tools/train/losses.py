@@ -9,7 +9,7 @@ HALF_SLOPE_CELLS = 4.0
 
 
 def sign_invariant(predicted, target):
-    """L1 distance [N] between displacements [N, 2] where v and -v are the same line."""
+    """L1 distance [N, ...] between displacements [N, 2, ...] where v and -v are the same line."""
     return torch.minimum((predicted - target).abs().sum(1), (predicted + target).abs().sum(1))
 
 
@@ -26,15 +26,10 @@ def line_loss(maps, target, displacement_scale, fixed_sign=False):
     """
     maps = maps.float()
     midpoint = soft_bce(maps[:, 1] - maps[:, 0], target[:, 0], POSITIVE_WEIGHT)
-    n, y, x = torch.nonzero(target[:, 1] > 0, as_tuple=True)
-    if not len(n):
-        zero = maps.sum() * 0
-        return midpoint, zero, zero
-    predicted, wanted = maps.permute(0, 2, 3, 1)[n, y, x], target.permute(0, 2, 3, 1)[n, y, x]
-    weight = wanted[:, 1] / wanted[:, 1].sum()
-    offset = ((torch.sigmoid(predicted[:, 2:4]) - wanted[:, 2:4]).abs().sum(1) * weight).sum()
-    dis = predicted[:, 4:6] * displacement_scale
-    error = (dis - wanted[:, 4:6]).abs().sum(1) if fixed_sign else sign_invariant(dis, wanted[:, 4:6])
+    weight = target[:, 1] / target[:, 1].sum().clamp(min=1e-6)
+    offset = ((torch.sigmoid(maps[:, 2:4]) - target[:, 2:4]).abs().sum(1) * weight).sum()
+    dis, wanted = maps[:, 4:6] * displacement_scale, target[:, 4:6]
+    error = (dis - wanted).abs().sum(1) if fixed_sign else sign_invariant(dis, wanted)
     return midpoint, offset, (HALF_SLOPE_CELLS * torch.log1p(error / HALF_SLOPE_CELLS) * weight).sum()
 
 
@@ -49,10 +44,10 @@ WEIGHTS = {"midpoint": 8.0, "offset": 1.0, "displacement": 0.4, "auxiliary": 0.5
 
 
 def total_loss(outputs, target, displacement_scale, fixed_sign=False):
-    """Sum over stacks of the weighted terms, and the last stack's terms as a dict of floats for the log."""
+    """Sum over stacks of the weighted terms, and the last stack's terms as a dict of tensors for the log."""
     total = 0
     for maps, aux in outputs:
         terms = dict(zip(("midpoint", "offset", "displacement"), line_loss(maps, target, displacement_scale, fixed_sign)))
         terms["auxiliary"] = auxiliary_loss(aux, target)
         total = total + sum(WEIGHTS[k] * v for k, v in terms.items())
-    return total, {k: float(v.detach()) for k, v in terms.items()}
+    return total, {k: v.detach() for k, v in terms.items()}

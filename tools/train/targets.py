@@ -1,6 +1,7 @@
 """Lines -> training maps at stride 4, and back. All coordinates in cells, 0 = left / top edge of the first cell."""
-import cv2
 import numpy as np
+
+from images import cv2
 
 # Spread of the labeller's midpoints in cells: neighbours of a midpoint's cell are soft positives.
 MIDPOINT_SIGMA = 0.5

@@ -249,7 +249,8 @@ Status WriteSequence(const SequenceOptions& options, const std::string& director
                                    {"camera.json", camera_json.dump(1) + "\n"},
                                    {"lines3d.txt", edges.SeenEdgesText()},
                                    {"annotations.json", edges.AnnotationsJson()}}) {
-    if (const Status written = WriteFileAtomically(root / name, text); !written) return written.error();
+    if (const Status written = WriteFileAtomically(root / name, text); !written)
+      return written.error();
   }
   return WritePoses(options, truth, root);
 }

@@ -167,5 +167,40 @@ TEST_F(SegmentRefinerTest, ReusedRefinerGivesTheSameBytes) {
   }
 }
 
+class SegmentRefinerBarTest : public ::testing::Test {
+ protected:
+  SegmentRefinerBarTest() : image_(200, 160) { bar_.Draw(&image_); }
+
+  const SoftRectangle bar_{{100, 80}, {70, 1.5}, 0.2};
+  GrayImage image_;
+};
+
+TEST_F(SegmentRefinerBarTest, OneDetectedBorderGivesBoth) {
+  Segment2 raw = bar_.Borders()[0];
+  raw.score = 0.7;
+  const auto refined = SegmentRefiner({}).Refine(image_.View(), std::vector<Segment2>{raw});
+  ASSERT_EQ(refined.size(), 2u);
+  EXPECT_LT(DistanceFromLine(refined[0], bar_.Borders()[0]), 0.3);
+  EXPECT_LT(DistanceFromLine(refined[1], bar_.Borders()[2]), 0.3);
+  EXPECT_EQ(refined[1].score, 0.7);
+}
+
+TEST_F(SegmentRefinerBarTest, WhicheverIsDetectedTheResultIsTheSamePair) {
+  const Segment2 top = bar_.Borders()[0], bottom = bar_.Borders()[2];
+  const auto of_bottom = SegmentRefiner({}).Refine(image_.View(), std::vector<Segment2>{bottom});
+  const auto of_both = SegmentRefiner({}).Refine(image_.View(), std::vector<Segment2>{top, bottom});
+  ASSERT_EQ(of_bottom.size(), 2u);
+  ASSERT_EQ(of_both.size(), 2u);
+  EXPECT_LT(DistanceFromLine(of_bottom[1], of_both[0]), 0.1);
+  EXPECT_LT(DistanceFromLine(of_bottom[0], of_both[1]), 0.1);
+}
+
+TEST_F(SegmentRefinerBarTest, OtherBordersCanBeLeftOut) {
+  SegmentRefinerOptions options;
+  options.add_other_borders = false;
+  const std::vector<Segment2> raw = {bar_.Borders()[0]};
+  EXPECT_EQ(SegmentRefiner(options).Refine(image_.View(), raw).size(), 1u);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -298,6 +299,41 @@ TEST(TrimToEdge, BridgesShortGapsButNotLongOnes) {
   };
   EXPECT_NEAR(trimmed_length(9), 160.0, 1e-9);
   EXPECT_NEAR(trimmed_length(30), 100.0, 6.0);
+}
+
+/// Rows above y = 80 have the level `above`, three rows `bar`, rows below `below`.
+GrayImage Bar(uint8_t above, uint8_t bar, uint8_t below) {
+  GrayImage image(200, 160, below);
+  for (int y = 0; y < 83; ++y) {
+    for (int x = 0; x < 200; ++x) image.At(x, y) = y < 80 ? above : bar;
+  }
+  return image;
+}
+
+/// The other border of a segment on the bar's upper border.
+std::optional<Segment2> OtherBorder(const GrayImage& image) {
+  const Segment2 upper{{50, 79.5}, {150, 79.5}, 0.8};
+  Segment2 other;
+  if (!FindOtherBorder(Blur(image), upper, &other)) return std::nullopt;
+  return other;
+}
+
+TEST(FindOtherBorder, OfABarIsFoundWhateverItsPolarity) {
+  for (const GrayImage& image : {Bar(50, 150, 50), Bar(150, 50, 150), Bar(50, 150, 80)}) {
+    const std::optional<Segment2> other = OtherBorder(image);
+    ASSERT_TRUE(other);
+    EXPECT_NEAR(other->start.y(), 82.5, 0.6);
+    EXPECT_NEAR(other->end.y(), 82.5, 0.6);
+    EXPECT_EQ(other->start.x(), 50.0);
+    EXPECT_EQ(other->score, 0.8);
+  }
+}
+
+TEST(FindOtherBorder, StepsAndStairsHaveNone) {
+  EXPECT_FALSE(OtherBorder(Bar(50, 150, 150)));  // one edge
+  EXPECT_FALSE(OtherBorder(Bar(50, 100, 150)));  // two of the same polarity
+  EXPECT_FALSE(OtherBorder(Bar(50, 150, 110)));  // 0.4 as strong
+  EXPECT_FALSE(OtherBorder(Bar(50, 53, 50)));    // hardly there
 }
 
 }  // namespace

@@ -88,6 +88,15 @@ struct SegmentRefiner::Impl {
   bool MoveOnEdge(Segment2* segment) const {
     MoveToRidge(blurred, kWideHalfWidthPx, segment);
     MoveToRidge(blurred, kNarrowHalfWidthPx, segment);
+    return CutToEdge(segment);
+  }
+
+  bool MoveOnOtherBorder(const Segment2& segment, Segment2* border) const {
+    return FindOtherBorder(blurred, segment, border) &&
+           MoveToRidge(blurred, kNarrowHalfWidthPx, border) && CutToEdge(border);
+  }
+
+  bool CutToEdge(Segment2* segment) const {
     if (options.trim) {
       if (!TrimToEdge(blurred, segment)) return false;
       MoveToRidge(blurred, kNarrowHalfWidthPx, segment);
@@ -95,15 +104,22 @@ struct SegmentRefiner::Impl {
     return IsLongEnough(*segment);
   }
 
-  // Remembers the segment unless one that was kept before explains it.
-  bool KeepUnlessDuplicate(const Segment2& segment) {
+  // Appends the segment unless duplicates are to go and one that was kept before explains it.
+  bool Keep(const Segment2& segment, std::vector<Segment2>* out_segments) {
+    if (options.remove_duplicates && IsDuplicate(segment)) return false;
+    out_segments->push_back(segment);
+    return true;
+  }
+
+  // Otherwise remembers the segment.
+  bool IsDuplicate(const Segment2& segment) {
     const double length = segment.Length();
     const Eigen::Vector2d unit = segment.Delta() / length;
     for (const KeptSegment& other : kept) {
-      if (IsCoveredBy(segment.start, unit, length, other)) return false;
+      if (IsCoveredBy(segment.start, unit, length, other)) return true;
     }
     kept.push_back({segment.start, unit, length});
-    return true;
+    return false;
   }
 };
 
@@ -131,11 +147,13 @@ void SegmentRefiner::Refine(const ImageView& image, std::span<const Segment2> se
   if (impl_->candidates.empty()) return;
   impl_->blurred.Assign(Luminance(image, &impl_->gray));
   impl_->kept.clear();
-  out_segments->reserve(impl_->candidates.size());
+  out_segments->reserve(2 * impl_->candidates.size());
+  Segment2 border;
   for (Segment2 segment : impl_->candidates) {
-    if (!impl_->MoveOnEdge(&segment)) continue;
-    if (impl_->options.remove_duplicates && !impl_->KeepUnlessDuplicate(segment)) continue;
-    out_segments->push_back(segment);
+    if (!impl_->MoveOnEdge(&segment) || !impl_->Keep(segment, out_segments)) continue;
+    if (impl_->options.add_other_borders && impl_->MoveOnOtherBorder(segment, &border)) {
+      impl_->Keep(border, out_segments);
+    }
   }
 }
 

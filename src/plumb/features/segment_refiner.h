@@ -1,4 +1,5 @@
-// Moves detected segments on to the image's edges: ridge, trim, ridge, duplicates out.
+// Moves detected segments on to the image's edges: ridge, trim, ridge, other borders in, duplicates
+// out.
 #pragma once
 
 #include <memory>
@@ -12,11 +13,12 @@
 namespace plumb {
 
 struct SegmentRefinerOptions {
-  double min_score = 0.0;       // segments below are dropped first ...
-  uint32_t min_count = 60;      // ... but never below so many of the best
-  uint32_t max_count = 400;     // best by score; 1..4096
-  double min_length_px = 12.0;  // shorter ones are dropped, before and after
-  bool trim = true;             // cut each segment to where its edge is
+  double min_score = 0.0;         // segments below are dropped first ...
+  uint32_t min_count = 60;        // ... but never below so many of the best
+  uint32_t max_count = 400;       // best by score; 1..4096
+  double min_length_px = 12.0;    // shorter ones are dropped, before and after
+  bool trim = true;               // cut each segment to where its edge is
+  bool add_other_borders = true;  // of bars and thin lines, with the score of the one detected
   bool remove_duplicates = true;
 };
 
@@ -29,7 +31,8 @@ class SegmentRefiner {
 
   /// @param image     The image that `segments` were found in; only its luminance is used.
   /// @param segments  [px], best score first.
-  /// @return refined segments, best score first; none for an invalid image.
+  /// @return refined segments, best score first, at most two for each of `max_count`; none for an
+  ///         invalid image.
   std::vector<Segment2> Refine(const ImageView& image, std::span<const Segment2> segments);
 
   /// The same into `out_segments`, without allocation once its capacity and the work space suffice.

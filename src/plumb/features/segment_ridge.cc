@@ -83,6 +83,17 @@ void SampleProfiles(const BlurredImage& image, const Segment2& segment, double h
   }
 }
 
+// Sum over the profiles of the derivative at offset `k`.
+float SumAcross(const Profiles& profiles, int k) {
+  float lanes[kLanes] = {};
+  for (int i = 0; i < profiles.num_profiles; i += kLanes) {
+    for (int l = 0; l < kLanes; ++l) lanes[l] += profiles.derivative[k][i + l];
+  }
+  float sum = 0.0f;
+  for (const float lane : lanes) sum += lane;
+  return sum;
+}
+
 // The edge that most of the profiles share.
 struct DominantEdge {
   int index = 0;         // offset
@@ -94,14 +105,8 @@ DominantEdge FindDominantEdge(const Profiles& profiles, double sigma_px) {
   DominantEdge edge;
   float strongest = 0.0f;
   for (int k = 0; k < profiles.num_derivatives; ++k) {
-    float lanes[kLanes] = {};
-    for (int i = 0; i < profiles.num_profiles; i += kLanes) {
-      for (int l = 0; l < kLanes; ++l) lanes[l] += profiles.derivative[k][i + l];
-    }
-    float sum = 0.0f;
-    for (const float lane : lanes) sum += lane;
     const double offset = profiles.OffsetPx(k) / sigma_px;
-    const float value = sum * static_cast<float>(std::exp(-0.5 * offset * offset));
+    const float value = SumAcross(profiles, k) * static_cast<float>(std::exp(-0.5 * offset * offset));
     if (std::abs(value) > strongest) {
       strongest = std::abs(value);
       edge = {k, value > 0.0f ? 1.0f : -1.0f};
@@ -236,6 +241,32 @@ bool MoveToRidge(const BlurredImage& image, double half_width_px, Segment2* segm
   const Eigen::Vector2d normal(-unit.y(), unit.x());
   segment->start += (line.at_middle - 0.5 * line.slope) * normal;
   segment->end += (line.at_middle + 0.5 * line.slope) * normal;
+  return true;
+}
+
+bool FindOtherBorder(const BlurredImage& image, const Segment2& segment, Segment2* out_border) {
+  constexpr float kMinRatio = 0.6f, kMinDerivative = 1.5f;
+  Profiles profiles;
+  SampleProfiles(image, segment, kWideHalfWidthPx, kRidgeProfiles, &profiles);
+  const float own = SumAcross(profiles, profiles.num_derivatives / 2);
+  const float polarity = own > 0.0f ? -1.0f : 1.0f;
+  int best = 0;
+  float strongest = 0.0f;
+  for (int k = 1; k < profiles.num_derivatives - 1; ++k) {
+    const float strength = polarity * SumAcross(profiles, k);
+    if (strength > strongest) {
+      strongest = strength;
+      best = k;
+    }
+  }
+  if (strongest < kMinRatio * std::abs(own) || strongest < kMinDerivative * kRidgeProfiles) {
+    return false;
+  }
+  const Eigen::Vector2d unit = segment.Delta().normalized();
+  const Eigen::Vector2d shift = profiles.OffsetPx(best) * Eigen::Vector2d(-unit.y(), unit.x());
+  *out_border = segment;
+  out_border->start += shift;
+  out_border->end += shift;
   return true;
 }
 

@@ -20,6 +20,16 @@ inline constexpr double kNarrowHalfWidthPx = 2.5;
 /// Source: docs/method/association.md, "Segments: detect, then move on to the ridge".
 bool MoveToRidge(const BlurredImage& image, double half_width_px, Segment2* segment);
 
+/// Looks beside `segment`, which lies on its edge, for the strongest edge of the opposite polarity
+/// within kWideHalfWidthPx: the other border of a bar or a thin line. Which of the two borders a
+/// detected segment moved on to is chance, so a view that keeps only one may lack the other view's.
+///
+/// @param out_border  Where it is, roughly: `segment` moved across itself; MoveToRidge() is next.
+/// @return false when that edge is less than 0.6 as strong or its mean derivative below 1.5 grey
+///         levels a pixel.
+/// Source: docs/method/association.md, "Segments".
+bool FindOtherBorder(const BlurredImage& image, const Segment2& segment, Segment2* out_border);
+
 /// Cuts `segment`, which lies on its edge, to the longest run of places where that edge is within
 /// 0.75 px and its derivative above 1.5 grey levels a pixel.
 ///

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -29,10 +30,10 @@ struct Oracle {
   std::vector<float> input, output;
 };
 
-Oracle LoadOracle(const std::string& name) {
-  auto model = LoadModel(kData + name + ".safetensors");
+Oracle LoadOracle(const std::string& name, const std::string& folder = kData) {
+  auto model = LoadModel(folder + name + ".safetensors");
   EXPECT_TRUE(model) << model.error().message;
-  const auto bytes = ReadFile(kData + name + "_io.safetensors");
+  const auto bytes = ReadFile(folder + name + "_io.safetensors");
   auto io = ParseSafetensors(bytes);
   EXPECT_TRUE(io) << io.error().message;
   Oracle oracle{.model = *std::move(model), .input = {}, .output = {}};
@@ -78,6 +79,23 @@ TEST(NetworkReference, AgreesWithPyTorch) {
 TEST_F(NetworkOnDevice, AgreesWithPyTorch) {
   for (const char* name : {"hybrid_1", "basic_2"}) {
     const Oracle oracle = LoadOracle(name);
+    EXPECT_LT(RelativeError(Forward(oracle.model, {}, oracle.input), oracle.output), kTolerance)
+        << name;
+  }
+}
+
+TEST_F(NetworkOnDevice, EveryPresetAgreesWithPyTorch) {
+  const std::string folder = PLUMB_PRESET_ORACLE;
+  if (!std::filesystem::exists(folder + "nano.safetensors")) {
+    GTEST_SKIP() << "no torch here wrote " << folder;
+  }
+  for (const char* name : {"nano", "mobile", "standard", "paper"}) {
+    const Oracle oracle = LoadOracle(name, folder);
+    const auto preset = PresetSpec(name);
+    PLUMB_ASSERT_OK(preset);
+    EXPECT_EQ(oracle.model.spec.width, preset->width) << name;
+    EXPECT_EQ(oracle.model.spec.stacks, preset->stacks) << name;
+    EXPECT_EQ(oracle.model.spec.block, preset->block) << name;
     EXPECT_LT(RelativeError(Forward(oracle.model, {}, oracle.input), oracle.output), kTolerance)
         << name;
   }

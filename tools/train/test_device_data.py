@@ -59,7 +59,8 @@ class DeviceData(unittest.TestCase):
         for a, b in ((maps, device_maps), (device_maps, maps)):
             for drawn, reference in zip(a[:, 6], b[:, 6]):
                 near = cv2.dilate(reference, np.ones((3, 3), np.uint8))
-                self.assertTrue((drawn <= near).all())
+                inside = (slice(1, -1), slice(1, -1))  # OpenCV leaves out lines along the border
+                self.assertTrue((drawn[inside] <= near[inside] + 1e-6).all())
 
     def test_each_degradation_equals_that_of_the_loader_thread(self):
         for name, value, limit in (("gamma", 0.5, 1.0), ("blur", 1.0, 1.0), ("jpeg", 1.0, 2.5)):

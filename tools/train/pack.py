@@ -41,7 +41,7 @@ def files_of(path):
     if os.path.isfile(path):
         return [(base, path)]
     found = []
-    for folder, folders, names in os.walk(path):
+    for folder, folders, names in os.walk(path, followlinks=True):
         folders.sort()
         found += [(os.path.join(base, os.path.relpath(os.path.join(folder, n), path)), os.path.join(folder, n)) for n in sorted(names)]
     if not found:

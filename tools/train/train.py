@@ -44,6 +44,7 @@ def parse_arguments(argv=None):
     parser.add_argument("--epochs", type=float, default=float("inf"), help="end after this many epochs in all")
     parser.add_argument("--decay-epochs", type=float, help="take the learning rate to zero over this many epochs, then end")
     parser.add_argument("--end-after-minutes", type=float, help="decay to zero and end at this training time, summed over resumed calls")
+    parser.add_argument("--finish", action="store_true", help="let the schedule of --end-after-minutes end with this call's --minutes")
     parser.add_argument("--decay-fraction", type=float, default=0.4, help="of --end-after-minutes in which the rate decays")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="stop this process after this time; resume continues")
     parser.add_argument("--save-minutes", type=float, default=3)
@@ -62,6 +63,8 @@ def parse_arguments(argv=None):
     args = parser.parse_args(argv)
     if args.decay_epochs and args.end_after_minutes:
         parser.error("--decay-epochs and --end-after-minutes exclude each other")
+    if args.finish and (not args.end_after_minutes or args.minutes == float("inf")):
+        parser.error("--finish needs --end-after-minutes and --minutes")
     args.loader = args.loader or ("threads" if args.device == "cpu" else "device")
     return args
 
@@ -251,6 +254,9 @@ def main(argv=None):
     if args.decay_epochs and run.decay_start is None:
         run.decay_start = run.progress(batches.per_epoch)
 
+    if args.finish:  # reading images took its time, and the end of the call is fixed
+        args.end_after_minutes = run.seconds / 60 + max(1e-3, args.minutes - (time.monotonic() - started) / 60)
+
     stopped = []
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopped.append(True))
@@ -273,7 +279,7 @@ def main(argv=None):
     stop = False
     while not stop and not run.ended(batches.per_epoch):
         run.epoch, run.index, images, maps = batches.next()
-        stop = bool(stopped) or time.monotonic() - started > 60 * args.minutes
+        stop = bool(stopped) or (time.monotonic() - started > 60 * args.minutes and not args.finish)
         step = images, maps, run.learning_rate(batches.per_epoch), stop
         if compiles:
             terms, stop, error = first_step(run, *step)
@@ -299,10 +305,10 @@ def main(argv=None):
             write_log(**watch(run, args, validation, annotated))
             watched = time.monotonic()
     if lead:
-        means()
+        last = means()
         run.save(path)
         end = "done" if run.ended(batches.per_epoch) else "signal" if stopped else "minutes"
-        write_log(**watch(run, args, validation, annotated), end=end)
+        write_log(**last, **watch(run, args, validation, annotated), end=end)
     batches.close()
 
 

@@ -9,7 +9,7 @@ import torch
 import torch.nn.functional as F
 
 from data import FILL, Batches, draw_view
-from model import STRIDE
+from model import STRIDE, constant
 from targets import MIDPOINT_SIGMA, MIN_LENGTH_CELLS, MIN_NEIGHBOUR
 
 # Columns of a view's row: index of the sample, 2x3 to the input, 2x3 back, gain, shift, gray, gamma, blur, noise, quality.
@@ -44,8 +44,8 @@ def warp(images, back, size):
     x = torch.arange(size, device=images.device, dtype=torch.float32)
     points = torch.stack([x.expand(size, size), x[:, None].expand(size, size), torch.ones(size, size, device=images.device)], -1)
     source = points.reshape(1, -1, 3) @ back.transpose(1, 2)
-    grid = (2 * source + 1) / source.new_tensor([width, height]) - 1
-    fill = torch.tensor(FILL, device=images.device, dtype=torch.float32).view(1, 3, 1, 1)
+    grid = (2 * source + 1) / constant((width, height), source.device) - 1
+    fill = constant(FILL, images.device).view(1, 3, 1, 1)
     planes = images.permute(0, 3, 1, 2).float() - fill  # zero outside is the fill colour outside
     return F.grid_sample(planes, grid.view(-1, size, size, 2), "bilinear", "zeros", align_corners=False) + fill
 
@@ -68,9 +68,9 @@ def compress(images, quality):
     k = torch.arange(8, device=device, dtype=torch.float32)
     dct = torch.cos((2 * k[None] + 1) * k[:, None] * math.pi / 16) / 2
     dct[0] /= math.sqrt(2)
-    luma = torch.tensor(LUMA_TABLE, device=device, dtype=torch.float32)
+    luma = constant(LUMA_TABLE, device)
     chroma = torch.full((8, 8), 99.0, device=device)
-    chroma[:4, :4] = torch.tensor(CHROMA_TABLE, device=device, dtype=torch.float32)
+    chroma[:4, :4] = constant(CHROMA_TABLE, device)
     scale = torch.where(quality < 50, 5000 / quality, 200 - 2 * quality).view(-1, 1, 1, 1, 1) / 100
 
     def quantise(plane, table):
@@ -100,7 +100,7 @@ def photograph(images, rows, host_rows, generator):
     images = images.clamp(0, 255)
     if (host_rows[:, GAMMA] != 1).any():
         images = 255 * (images / 255) ** column(GAMMA)
-    gray = (images * images.new_tensor([0.299, 0.587, 0.114]).view(1, 3, 1, 1)).sum(1, keepdim=True)
+    gray = (images * constant((0.299, 0.587, 0.114), images.device).view(1, 3, 1, 1)).sum(1, keepdim=True)
     images = torch.where(column(GRAY) > 0, gray, images)
     if host_rows[:, BLUR].any():
         images = blur(images, rows[:, BLUR])
@@ -109,7 +109,7 @@ def photograph(images, rows, host_rows, generator):
         images = (images + column(NOISE) * noise).clamp(0, 255)
     compressed = np.flatnonzero(host_rows[:, QUALITY])
     if len(compressed):
-        chosen = torch.from_numpy(compressed).to(images.device)
+        chosen = torch.from_numpy(compressed).to(images.device, non_blocking=True)
         images = images.index_copy(0, chosen, compress(images[chosen], rows[chosen, QUALITY]))
     return images.round()
 
@@ -136,7 +136,7 @@ def encode(lines, scores, size):
     own = ((mid - cell - 0.5) ** 2).sum(2)
 
     # Each cell belongs to the line with the largest weight there; at equal weights to the later line.
-    step = torch.tensor([-1, 0, 1], device=lines.device)
+    step = torch.arange(-1, 2, device=lines.device)
     near = cell[:, :, None].long() + torch.cartesian_prod(step, step)  # [B, M, 9, 2]
     spread = torch.exp((own[..., None] - ((mid[:, :, None] - near - 0.5) ** 2).sum(3)) / (2 * MIDPOINT_SIGMA**2))
     weight = scores[..., None] * spread
@@ -195,7 +195,7 @@ class DeviceBatches(Batches):
 
     def next(self):
         epoch, index, host_rows = super().next()
-        rows = torch.from_numpy(host_rows).to(self._device)
+        rows = torch.from_numpy(host_rows).to(self._device, non_blocking=True)
         chosen = rows[:, INDEX].long()
         generator = torch.Generator(self._device).manual_seed(hash((self.seed, epoch, index)) & 0xFFFFFFFF)
         images = warp(self._store.images[chosen], rows[:, BACK : BACK + 6].view(-1, 2, 3), self.size)

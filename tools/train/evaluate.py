@@ -12,7 +12,7 @@ import torch.nn.functional as F
 
 import weights_file
 from images import read_all
-from model import MEAN, STD, STRIDE
+from model import MEAN, STD, STRIDE, constant
 from pixel_ap import pixel_metrics
 from sap import sap
 from targets import clip_lines, decode
@@ -25,7 +25,7 @@ NMS_DECAY = 0.5  # sAP10 is 2 above that of 0, and 1 above 0.8's
 def to_tensor(images):
     """RGB 0..255 [N, H, W, 3], array or tensor -> normalised float [N, 3, H, W] in channels-last memory."""
     x = torch.as_tensor(images).permute(0, 3, 1, 2).float()
-    mean, std = (torch.tensor(v, device=x.device).view(1, 3, 1, 1) for v in (MEAN, STD))
+    mean, std = (constant(v, x.device).view(1, 3, 1, 1) for v in (MEAN, STD))
     return ((x - mean) / std).contiguous(memory_format=torch.channels_last)
 
 

@@ -2,6 +2,7 @@
 
 Module names are the tensor names of the weights file, so `state_dict()` is the file's content (less `aux` and counters).
 """
+import functools
 from dataclasses import dataclass
 
 import torch
@@ -30,6 +31,12 @@ PRESETS = {
     "standard": Preset(64, 1, "hybrid", 512),
     "paper": Preset(64, 2, "hybrid", 512),
 }
+
+
+@functools.lru_cache(maxsize=None)
+def constant(values, device):
+    """A float tensor of a (nested) tuple, copied to `device` once: every such copy waits for all the work that a GPU has queued."""
+    return torch.tensor(values, dtype=torch.float32, device=device)
 
 
 class Block(nn.Module):

@@ -247,6 +247,8 @@ def main(argv=None):
     recipe = replace(RECIPES[args.preset], **DRY_RUN) if args.dry_run else RECIPES[args.preset]
     if args.dry_run:
         project(args.preset, RECIPES[args.preset], 25)
+    if args.start_from:  # what is trained already has chosen its signs
+        recipe = replace(recipe, fixed_sign_steps=0)
     args = unpacked(args)
     record, state = os.path.join(args.out, "progress.json"), os.path.join(args.out, "state.pt")
     progress = Progress.load(record)

@@ -1,5 +1,6 @@
 #include "plumb/runtime/acceptance_gate.h"
 
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -12,19 +13,34 @@ GateEvidence GoodEvidence() {
   evidence.refined = {1000.0, 0.5};
   evidence.prior = {300.0, 0.2};
   evidence.runner_up_ratio = 0.4;
-  evidence.num_pairs = 80;
+  evidence.evidence_nats = 60.0;
   evidence.num_observed_directions = 6;
   return evidence;
 }
 
 TEST(Decide, GoodEvidenceRefines) { EXPECT_EQ(Decide(GoodEvidence(), {}), RefineStatus::kRefined); }
 
-TEST(Decide, FewPairsAreLowSupport) {
+TEST(Decide, WhatChanceMayReachIsLowSupport) {
   GateEvidence evidence = GoodEvidence();
-  evidence.num_pairs = 9;
-  EXPECT_EQ(Decide(evidence, {}), RefineStatus::kLowSupport);
-  evidence.num_pairs = 10;
-  EXPECT_EQ(Decide(evidence, {}), RefineStatus::kRefined);
+  evidence.evidence_nats = 6.9;
+  EXPECT_EQ(Decide(evidence, {.min_evidence_nats = 7.0}), RefineStatus::kLowSupport);
+  EXPECT_EQ(Decide(evidence, {.min_evidence_nats = 6.8}), RefineStatus::kRefined);
+}
+
+TEST(EvidenceToBeat, GrowsWithThePosesTried) {
+  EXPECT_DOUBLE_EQ(EvidenceToBeat(1), std::log(20.0));
+  EXPECT_DOUBLE_EQ(EvidenceToBeat(20), std::log(20.0));
+  EXPECT_DOUBLE_EQ(EvidenceToBeat(1500), std::log(1500.0));
+}
+
+TEST(CountDistinctPoses, ATightPriorHasFew) {
+  const auto count = [](double position_m, double rotation_rad) {
+    return CountDistinctPoses({{}, position_m, rotation_rad}, 2048);
+  };
+  EXPECT_EQ(count(1e-6, 1e-6), 1u);
+  EXPECT_LT(count(0.05, 0.0175), 200u);
+  EXPECT_GT(count(0.10, 0.0349), 1000u);
+  EXPECT_EQ(count(0.40, 0.14), 2048u);  // no more than are drawn
 }
 
 TEST(Decide, ASmallShareOfTheMapIsLowSupport) {
@@ -64,6 +80,9 @@ TEST(Decide, NotANumberNeverRefines) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   GateEvidence evidence = GoodEvidence();
   evidence.refined.map_share = nan;
+  EXPECT_EQ(Decide(evidence, {}), RefineStatus::kLowSupport);
+  evidence = GoodEvidence();
+  evidence.evidence_nats = nan;
   EXPECT_EQ(Decide(evidence, {}), RefineStatus::kLowSupport);
   evidence = GoodEvidence();
   evidence.refined.detected_px = nan;

@@ -45,6 +45,7 @@ Json DescribeFrame(const FrameResult& result) {
               {"matches", refined.matches.size()},
               {"points", refined.num_points_used},
               {"map_support", Rounded(refined.map_support, 5)},
+              {"evidence", Rounded(refined.evidence_nats, 3)},
               {"runner_up_ratio", Rounded(refined.runner_up_ratio, 5)},
               {"searched", result.searched},
               {"ms",

@@ -180,7 +180,7 @@ typedef struct plumb_session_options {
   const plumb_vulkan_host* vulkan_host; /* NULL: the library opens a device of its own */
   uint32_t num_hypotheses;              /* of the search, 1..2048; 0: 1500 */
   uint32_t max_segments;                /* best detected segments to use, 1..4096; 0: 400 */
-  double min_map_support;    /* least share of the visible map to accept a pose, (0, 1); 0: 0.12 */
+  double min_map_support;    /* least share of the visible map to accept a pose, (0, 1); 0: 0.05 */
   uint64_t seed;             /* equal inputs and seeds give equal results */
   int64_t deadline_ns;       /* frames whose lines are found later are not refined; 0: none */
   int64_t submit_timeout_ns; /* longest wait of a blocking submit; 0: no limit */

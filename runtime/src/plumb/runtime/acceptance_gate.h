@@ -1,7 +1,7 @@
 // The acceptance gate: when a refined pose may replace the prior.
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 
 #include "plumb/geometry/rigid3.h"
 #include "plumb/matching/support.h"
@@ -14,17 +14,27 @@ struct GateEvidence {
   PoseSupport refined, prior;
   double runner_up_ratio = 0.0;     // value of the best clearly different pose over the refined's
   bool is_near_prior = true;        // IsPlausible()
-  size_t num_pairs = 0;             // line-segment pairs that hold the refined pose
+  double evidence_nats = 0.0;       // MatchEvidence of the refined pose
   int num_observed_directions = 0;  // of 6
 };
 
 struct GateOptions {
-  double min_map_support = 0.12;
+  double min_map_support = 0.05;
+  /// EvidenceToBeat() of the poses that were tried.
+  double min_evidence_nats = 3.0;
   double min_gain = 1.03;  // of the support's value over the prior's; 1.00 in a stream
   /// The lines must determine all six directions better than the prior does. Not in a stream, whose
   /// prediction is good to 2 cm: there the prior may hold what the lines leave open.
   bool needs_all_directions = true;
 };
+
+/// How many of `num_hypotheses` poses drawn from the prior can be told apart, 2 cm or 0.01 rad from
+/// each other: draws from a tight prior lead to the same place.
+uint32_t CountDistinctPoses(const PosePrior& prior, uint32_t num_hypotheses);
+
+/// Evidence that the best of `num_tried` poses reaches by chance less than once: its logarithm, and
+/// never less than log 20, so that a single wrong pose passes in one frame of twenty at most.
+double EvidenceToBeat(uint32_t num_tried);
 
 /// Poses farther apart than this are clearly different.
 inline constexpr double kDifferentPositionM = 0.05, kDifferentRotationRad = 0.02;

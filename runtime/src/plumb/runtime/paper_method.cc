@@ -106,16 +106,19 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
   const Matrix6d prior_information =
       PriorCovariance(input.prior.rotation_sigma_rad, input.prior.position_sigma_m).inverse();
   const double factor = index_.map().covariance_factor;
+  const PoseSupport prior_support = MeasureSupport(input.camera, prior);
   const GateEvidence evidence{
-      .refined = MeasureSupport(input.camera, refined),
-      .prior = MeasureSupport(input.camera, prior),
+      .refined = MeasureSupport(input.camera, refined),  // last: projects for the evidence
+      .prior = prior_support,
       .is_near_prior = IsPlausible(refined, input.prior),
-      .num_pairs = observations_.size(),
+      .evidence_nats = evidence_meter_.Measure(projected_, segments_.table).nats,
       .num_observed_directions = CountObservedDirections(
           terms.equations.information / std::max(terms.residual_scale, 1.0), input.prior)};
-  result->status =
-      Decide(evidence, {.min_map_support = options_.min_map_support, .min_gain = kMinGain});
+  result->status = Decide(evidence, {.min_map_support = options_.min_map_support,
+                                     .min_evidence_nats = EvidenceToBeat(1),
+                                     .min_gain = kMinGain});
   result->map_support = evidence.refined.map_share;
+  result->evidence_nats = evidence.evidence_nats;
   result->num_observed_directions = evidence.num_observed_directions;
   if (result->status == RefineStatus::kRefined) {
     result->cam_from_world = refined;

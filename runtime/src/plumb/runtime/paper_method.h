@@ -7,6 +7,7 @@
 #include "plumb/map/map_index.h"
 #include "plumb/matching/candidate_line.h"
 #include "plumb/matching/epipolar_matcher.h"
+#include "plumb/matching/match_evidence.h"
 #include "plumb/matching/support.h"
 #include "plumb/refine/joint_solver.h"
 #include "plumb/refine/normal_equations.h"
@@ -45,6 +46,7 @@ class PaperMethod {
   std::vector<CandidateLine> search_lines_;
   ProjectedLines projected_;
   SupportMeter support_meter_;
+  EvidenceMeter evidence_meter_;
   std::vector<uint32_t> key_frames_;
   std::vector<MatchCandidate> candidates_;
   std::vector<LineAssignment> assignments_;

@@ -50,9 +50,9 @@ enum class RefineMethod { kSearch, kPaper };
 struct PoseRefinerOptions {
   RefineMethod method = RefineMethod::kSearch;
   uint32_t num_hypotheses = 1500;  // of the search, 1..2048
-  /// Smallest share of the visible map's length that the segments must explain, in (0, 1). 0.12
-  /// suits segments that RefineSegments trimmed.
-  double min_map_support = 0.12;
+  /// Smallest share of the visible map's length that the segments must explain, in (0, 1). Chance
+  /// is judged by the evidence; this only refuses poses that are right and of no use.
+  double min_map_support = 0.05;
   /// Seed of the search's random draws; the frame's `seed` is mixed in.
   uint64_t seed = 0;
 
@@ -85,6 +85,9 @@ struct RefineResult {
   int num_observed_directions =
       0;                     // of 6, directions that the matches determine better than the prior
   double map_support = 0.0;  // share of the visible map's length that was found, 0..1
+  /// How much likelier the segments are at the pose found than by chance, as a logarithm [nats]
+  /// (MatchEvidence); also of poses that were refused.
+  double evidence_nats = 0.0;
   double runner_up_ratio = 0.0;    // support of the best clearly different pose over the winner's
   std::vector<LineMatch> matches;  // at cam_from_world
   uint32_t num_points_used = 0;

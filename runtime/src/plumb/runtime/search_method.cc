@@ -11,7 +11,8 @@ namespace plumb {
 namespace {
 
 constexpr size_t kMaxSegments = 250;
-constexpr size_t kMinLines = 6, kMinSegments = 6;
+// Three lines determine a pose, a fourth one can contradict it.
+constexpr size_t kMinLines = 4, kMinSegments = 4;
 constexpr double kMinVisiblePx = 10.0;
 
 // The prior is a weak factor of the alignment: it decides only what the lines leave open.
@@ -25,10 +26,6 @@ constexpr double kSearchGain = 1.03, kStreamGain = 1.0;
 // A second attempt looks twice as far. A prior that was found good needs none.
 constexpr double kWideningFactor = 2.0;
 constexpr uint32_t kMaxHypotheses = 2048;
-// The farther the search looks, the more likely another place explains the segments: the second
-// attempt has to find twice the map's share, and not to contradict the prior as it was given.
-constexpr AttemptGate kFirstGate{.map_support_factor = 1.0};
-constexpr AttemptGate kSecondGate{.map_support_factor = 2.0};
 
 constexpr size_t kMinLocalLines = 20;
 
@@ -79,14 +76,16 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   segments_.Assign(input.segments, kMaxSegments);
   AcceptPoints(input);
   PosePrior prior = input.prior;
-  Attempt attempt = Try(input, prior, options_.num_hypotheses, kFirstGate);
+  const uint32_t num_tried = CountDistinctPoses(prior, input.search ? options_.num_hypotheses : 1);
+  Attempt attempt = Try(input, prior, options_.num_hypotheses, num_tried);
   int64_t search_ns = attempt.search_ns;
   if (input.search && MayWiden(attempt, prior.cam_from_world)) {
     PosePrior wide = prior;
     wide.position_sigma_m *= kWideningFactor;
     wide.rotation_sigma_rad *= kWideningFactor;
+    const uint32_t num_hypotheses = std::min(kMaxHypotheses, 2 * options_.num_hypotheses);
     const Attempt second =
-        Try(input, wide, std::min(kMaxHypotheses, 2 * options_.num_hypotheses), kSecondGate);
+        Try(input, wide, num_hypotheses, num_tried + CountDistinctPoses(wide, num_hypotheses));
     search_ns += second.search_ns;
     if (second.status == RefineStatus::kRefined) {
       attempt = second;
@@ -94,6 +93,7 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
     }
   }
   result->map_support = attempt.evidence.refined.map_share;
+  result->evidence_nats = attempt.evidence.evidence_nats;
   result->runner_up_ratio = attempt.evidence.runner_up_ratio;
   result->num_observed_directions = attempt.evidence.num_observed_directions;
   result->status = attempt.status;
@@ -160,7 +160,7 @@ bool SearchMethod::MayWiden(const Attempt& attempt, const Rigid3& prior) {
 }
 
 SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrior& prior,
-                                        uint32_t num_hypotheses, const AttemptGate& gate) {
+                                        uint32_t num_hypotheses, uint32_t num_tried) {
   Attempt attempt;
   attempt.alignment.cam_from_world = prior.cam_from_world;
   selector_.SelectForSearch(input.camera, prior.cam_from_world, prior.rotation_sigma_rad,
@@ -207,13 +207,13 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
       .prior = MeasureSupport(input.camera, prior.cam_from_world),
       .runner_up_ratio = value > 0.0 ? runner_up / value : 0.0,
       .is_near_prior = IsPlausible(best.alignment.cam_from_world, input.prior),
-      .num_pairs = best.alignment.num_pairs,
+      .evidence_nats = MeasureEvidence(input.camera, best.alignment.cam_from_world).nats,
       .num_observed_directions = CountObservedDirections(
           best.alignment.line_information / std::max(best.alignment.residual_scale, 1.0), prior)};
-  attempt.status = Decide(attempt.evidence,
-                          {.min_map_support = gate.map_support_factor * options_.min_map_support,
-                           .min_gain = input.search ? kSearchGain : kStreamGain,
-                           .needs_all_directions = input.search});
+  attempt.status = Decide(attempt.evidence, {.min_map_support = options_.min_map_support,
+                                             .min_evidence_nats = EvidenceToBeat(num_tried),
+                                             .min_gain = input.search ? kSearchGain : kStreamGain,
+                                             .needs_all_directions = input.search});
   return attempt;
 }
 
@@ -238,6 +238,11 @@ std::span<const FoundPose> SearchMethod::FindStarts(const RefineInput& input,
 PoseSupport SearchMethod::MeasureSupport(const Camera& camera, const Rigid3& cam_from_world) {
   ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
   return support_meter_.Measure(projected_, segments_.table);
+}
+
+MatchEvidence SearchMethod::MeasureEvidence(const Camera& camera, const Rigid3& cam_from_world) {
+  ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
+  return evidence_meter_.Measure(projected_, segments_.table);
 }
 
 void SearchMethod::FinishOnLocalLines(const RefineInput& input, const PosePriorFactor& prior,

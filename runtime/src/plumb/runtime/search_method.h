@@ -7,6 +7,7 @@
 
 #include "plumb/map/map_index.h"
 #include "plumb/matching/candidate_line.h"
+#include "plumb/matching/match_evidence.h"
 #include "plumb/matching/support.h"
 #include "plumb/runtime/acceptance_gate.h"
 #include "plumb/runtime/fine_alignment.h"
@@ -16,11 +17,6 @@
 #include "plumb/search/pose_search.h"
 
 namespace plumb {
-
-/// How much more than usual an attempt must find to be accepted.
-struct AttemptGate {
-  double map_support_factor = 1.0;  // times PoseRefinerOptions::min_map_support
-};
 
 /// One per PoseRefiner; input must have been checked. Owns all work space.
 /// Source: docs/method/association.md, "search".
@@ -45,8 +41,9 @@ class SearchMethod {
     PoseSupport support;
   };
 
+  /// @param num_tried  Poses that the frame has tried in the end, for EvidenceToBeat().
   Attempt Try(const RefineInput& input, const PosePrior& prior, uint32_t num_hypotheses,
-              const AttemptGate& gate);
+              uint32_t num_tried);
   /// Whether a search with a larger uncertainty can still help.
   static bool MayWiden(const Attempt& attempt, const Rigid3& prior);
   /// Solves the pose from the points alone, if there are enough.
@@ -55,6 +52,7 @@ class SearchMethod {
   std::span<const FoundPose> FindStarts(const RefineInput& input, const PosePrior& prior,
                                         uint32_t num_hypotheses);
   PoseSupport MeasureSupport(const Camera& camera, const Rigid3& cam_from_world);
+  MatchEvidence MeasureEvidence(const Camera& camera, const Rigid3& cam_from_world);
   /// The last steps of a pose that was accepted, and its covariance.
   void Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
               RefineResult* result);
@@ -77,6 +75,7 @@ class SearchMethod {
   std::array<FoundPose, 1> only_prior_;
   FineAligner aligner_;
   SupportMeter support_meter_;
+  EvidenceMeter evidence_meter_;
   ProjectedLines projected_;
   std::vector<Survivor> survivors_;
   PointSolver point_solver_;

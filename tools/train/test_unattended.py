@@ -114,6 +114,17 @@ class DryRun(unittest.TestCase):
             self.assertEqual((metadata["preset"], metadata["input_width"]), ("nano", "320"))
         self.assertIn("images/s", output.getvalue())
 
+    def test_killed_call_has_used_its_time(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write_images(folder + "/train")
+            command = ["nano", "--data", folder + "/train", "--out", folder + "/run", "--dry-run", "--minutes", "25"]
+            with mock.patch.object(unattended.subprocess, "run", side_effect=KeyboardInterrupt), contextlib.redirect_stdout(io.StringIO()):
+                with self.assertRaises(KeyboardInterrupt):
+                    unattended.main(command)
+            progress = Progress.load(folder + "/run/progress.json")
+        self.assertEqual((progress.calls, progress.finished), (1, False))
+        self.assertAlmostEqual(progress.wall_minutes, 25 / 3)
+
     def test_steps_are_measured_plain_and_compiled(self):
         output = io.StringIO()
         with contextlib.redirect_stdout(output):

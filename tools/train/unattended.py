@@ -252,12 +252,15 @@ def main(argv=None):
     args = unpacked(args)
     record, state = os.path.join(args.out, "progress.json"), os.path.join(args.out, "state.pt")
     progress = Progress.load(record)
+    progress.trained_minutes = trained_minutes(state)
+    before = progress.wall_minutes
     if not progress.finished:
+        # A call that is killed has used its time all the same.
+        replace(progress, calls=progress.calls + 1, wall_minutes=before + call_plan(progress, args.minutes, args.call_minutes)[1]).save(record)
         progress.finished = train_for_a_call(args, recipe, progress, started, state)
-        progress.save(record)
     collect(args, progress, state)
     progress.calls += 1
-    progress.wall_minutes += (time.monotonic() - started) / 60
+    progress.wall_minutes = before + (time.monotonic() - started) / 60
     progress.save(record)
     return 0 if progress.finished else CALL_AGAIN
 

@@ -100,6 +100,25 @@ TEST(Program, RefinedSegmentsLieOnTheEdges) {
   }
 }
 
+TEST(Program, DetectTakesOptionsForTheSegments) {
+  const TemporaryDirectory dir;
+  const std::string detect = "detect " + WriteRectangle(dir, "a.png") + " --model lsd --json ";
+  const auto count = [&](const std::string& options) {
+    const ProgramRun run = RunPlumbline(detect + options);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return json::parse(run.out)[0]["lines"].size();
+  };
+  EXPECT_EQ(count("--top-k 3"), 3u);
+  EXPECT_EQ(count("--min-length 70"), 2u);  // the rectangle is 80 x 60 px
+  EXPECT_EQ(count("--score-threshold 1"), 0u);
+  EXPECT_EQ(count("--tiles 2x1"), 4u);
+  EXPECT_EQ(count("--tiles auto --structural-nms 2"), 4u);
+  for (const char* wrong : {"--tiles 0x2", "--tiles 2", "--tiles many", "--top-k 0",
+                            "--score-threshold 2", "--min-length -1"}) {
+    EXPECT_EQ(RunPlumbline(detect + wrong).exit_code, 64) << wrong;
+  }
+}
+
 TEST(Program, DetectNamesTheImageThatFails) {
   const TemporaryDirectory dir;
   const ProgramRun missing = RunPlumbline("detect " + (dir / "no.png") + " --model lsd --json");

@@ -1,7 +1,8 @@
-// From the options --model and --device to a line detector.
+// From the options that every command with a detector has to a line detector.
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -16,9 +17,14 @@ namespace plumb::tools {
 struct DetectorOptions {
   std::string model = "nano";
   std::string device = "auto";
+  std::optional<float> score_threshold;  // absent: the model's
+  std::optional<int> max_lines;          // absent: the model's
+  double min_length_px = 0.0;
+  double structural_nms = 0.0;
+  std::string tiles = "none";  // none, auto or CxR
 };
 
-/// Declares --model and --device.
+/// Declares --model, --device, --score-threshold, --top-k, --min-length, --structural-nms, --tiles.
 void BindDetectorOptions(CLI::App& command, DetectorOptions& options);
 void BindDeviceOption(CLI::App& command, std::string& selector);
 
@@ -30,8 +36,5 @@ Outcome OpenDevice(const std::string& selector, std::shared_ptr<gpu::Device>* ou
 /// assets/models/NAME.safetensors and share/plumbline/models/NAME.safetensors in the folders above
 /// the program.
 Outcome CreateDetector(const DetectorOptions& options, std::unique_ptr<LineDetector>* out_detector);
-
-/// What the detector runs on, for reports: the device's name, "cpu" for LSD.
-std::string DeviceOf(const LineDetector& detector);
 
 }  // namespace plumb::tools

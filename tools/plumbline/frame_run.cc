@@ -167,7 +167,7 @@ Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
   out_run->index = std::make_unique<MapIndex>(out_run->map);
   if (Outcome failed = CreateDetector(options.detector, &out_run->detector)) return failed;
   out_run->detector_name = out_run->detector->Name();
-  out_run->device = DeviceOf(*out_run->detector);
+  out_run->device = out_run->detector->DeviceName();
   if (out_run->detector_name != out_run->map.detector) {
     PrintRemark(options.map + ": was built with " + out_run->map.detector +
                 "'s lines, the queries use " + out_run->detector_name + "'s");

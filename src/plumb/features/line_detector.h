@@ -10,6 +10,10 @@
 
 namespace plumb {
 
+struct ImageSize {
+  int width_px = 0, height_px = 0;
+};
+
 /// A detector finds raw segments; RefineSegments (segment_refiner.h) then moves them on to the
 /// image's edges, the same way for every detector.
 ///
@@ -32,6 +36,12 @@ class LineDetector {
 
   /// Name for reports: "lsd", "nano", ...
   virtual std::string Name() const = 0;
+
+  /// What it runs on, for reports.
+  virtual std::string DeviceName() const { return "cpu"; }
+
+  /// The size that every image is scaled to; 0 x 0 where images are taken as they are.
+  virtual ImageSize InputSize() const { return {}; }
 
   /// Submit() and Collect() in one call.
   Result<std::vector<Segment2>> Detect(const ImageView& image) {

@@ -63,12 +63,17 @@ class VlseDetector : public LineDetector {
   /// The model's preset.
   std::string Name() const override { return name_; }
 
+  std::string DeviceName() const override { return device_->Info().name; }
+
+  ImageSize InputSize() const override {
+    return {network_->info().input_width, network_->info().input_height};
+  }
+
   /// Device time of "preprocess", "network" and "decode" for the last collected image; empty where
   /// the device has no timestamps.
   std::span<const gpu::StageTime> StageTimes() const { return stage_times_; }
 
   const nn::NetworkInfo& GetNetworkInfo() const { return network_->info(); }
-  const gpu::DeviceInfo& GetDeviceInfo() const { return device_->Info(); }
 
  private:
   VlseDetector() = default;

@@ -144,11 +144,38 @@ TEST(MapIndex, RanksARotationOfOneRadianLikeOneMetre) {
   EXPECT_THAT(key_frames, ElementsAre(0u, 1u));
 }
 
+TEST(MapIndex, TellsTheVisibleLengthsOfTheSameLines) {
+  const LineMap map = MakeRandomMap({300, 12, 0, 0}, /*seed=*/6);
+  const MapIndex index(map);
+  std::vector<uint32_t> ids;
+  std::vector<VisibleLine> visible;
+  size_t num_visible = 0;
+  for (int k = 0; k < 50; ++k) {
+    const Rigid3 pose = map.key_frames[static_cast<size_t>(k) % 12].cam_from_world;
+    VisibilityOptions options;
+    options.nearest_key_frames = k % 2 == 0 ? 0 : 4;
+    index.VisibleLines(kCamera, pose, options, &ids);
+    index.VisibleLines(kCamera, pose, options, &visible);
+    std::sort(visible.begin(), visible.end(),
+              [](const VisibleLine& a, const VisibleLine& b) { return a.line < b.line; });
+    ASSERT_EQ(visible.size(), ids.size());
+    for (size_t i = 0; i < ids.size(); ++i) {
+      EXPECT_EQ(visible[i].line, ids[i]);
+      const auto image =
+          ProjectSegment(kCamera, pose, map.lines[ids[i]].segment_in_world, options.margin_px);
+      ASSERT_TRUE(image);
+      EXPECT_NEAR(visible[i].length_px, image->Length(), 1e-2);
+    }
+    num_visible += ids.size();
+  }
+  EXPECT_GT(num_visible, 500u);
+}
+
 TEST(MapIndex, OfAnEmptyMapFindsNothing) {
   const LineMap map;
   const MapIndex index(map);
   std::vector<uint32_t> out = {7};
-  index.VisibleLines(kCamera, {}, {}, &out);
+  index.VisibleLines(kCamera, Rigid3{}, VisibilityOptions{}, &out);
   EXPECT_THAT(out, IsEmpty());
   out = {7};
   index.NearestKeyFrames({}, 5, &out);

@@ -87,7 +87,8 @@ TEST(SegmentTable, ForgetsWhatItHeldBefore) {
   table.Assign(RandomSegments(20, /*seed=*/2));
   table.Assign(std::vector<Segment2>{AtDegrees(30)});
   EXPECT_EQ(table.size(), 1u);
-  EXPECT_EQ(table.x0.size(), 1u);
+  EXPECT_EQ(table.angle.size(), 1u);
+  EXPECT_EQ(table.x0.size(), 1u + SegmentTable::kLanes);
   table.Assign({});
   EXPECT_EQ(table.size(), 0u);
   EXPECT_THAT(Rows(table.NearAngle(1.0f, 0.5f)), IsEmpty());

@@ -87,8 +87,9 @@ TEST(PoseSearch, FindsThePoseFromTwentyCentimetresAndFourDegrees) {
         search.Search(testing::RoomCamera(), {prior, 4.0 * kDegree, 0.20}, lines, segments, {}, k);
     ASSERT_FALSE(found.empty());
     const PoseDistance error = DistanceBetween(found[0].cam_from_world, truth);
-    EXPECT_LT(error.position_m, 0.04) << "query " << k;
-    EXPECT_LT(error.rotation_rad, 0.8 * kDegree) << "query " << k;
+    // Near enough for the matching's first gate of 24 px.
+    EXPECT_LT(error.position_m, 0.06) << "query " << k;
+    EXPECT_LT(error.rotation_rad, 1.4 * kDegree) << "query " << k;
   }
 }
 

@@ -38,8 +38,8 @@ TEST(Program, WithoutACommandIsWrongUsage) {
 TEST(Program, EveryCommandHasHelp) {
   for (const char* command :
        {"", "detect", "map", "map build", "map info", "map export", "replay", "eval", "eval lines",
-        "eval repeatability", "eval trajectory", "bench", "bench net", "bench frame", "synth",
-        "device", "device list", "version"}) {
+        "eval repeatability", "eval trajectory", "bench", "bench net", "bench frame",
+        "bench refine", "synth", "device", "device list", "version"}) {
     const ProgramRun run = RunPlumbline(std::string(command) + " --help");
     EXPECT_EQ(run.exit_code, 0) << command;
     EXPECT_THAT(run.out, HasSubstr("Usage:")) << command;
@@ -177,6 +177,21 @@ TEST(Program, BenchNetReportsTimeAndWork) {
   EXPECT_GE(report["p95_ms"].get<double>(), report["median_ms"].get<double>());
   EXPECT_GT(report["gmac"].get<double>(), 0.0);
   EXPECT_TRUE(report["device"].is_string());
+}
+
+TEST(Program, BenchRefineReportsStagesAndErrorsOnAGeneratedMap) {
+  const ProgramRun run =
+      RunPlumbline("bench refine --lines 2000 --num-frames 5 --warm-up 1 --hypotheses 200 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_EQ(report["frames"], 5);
+  EXPECT_EQ(report["map_lines"], 2000);
+  for (const char* stage :
+       {"index", "field", "score", "coarse", "fine", "local", "joint", "total"}) {
+    EXPECT_GT(report["ms"][stage]["p50"].get<double>(), 0.0) << stage;
+  }
+  EXPECT_LT(report["error"]["median_cm"].get<double>(), 1.0);
+  EXPECT_EQ(RunPlumbline("bench refine --segments lines.json").exit_code, 64);
 }
 
 TEST(Program, NetworkWeightsThatAreMissingOrCorruptAreErrors) {

@@ -7,6 +7,7 @@ namespace plumb::tools {
 
 void AddBenchFrame(CLI::App& bench, PendingRun& pending);
 void AddBenchNet(CLI::App& bench, PendingRun& pending);
+void AddBenchRefine(CLI::App& bench, PendingRun& pending);
 void AddDetect(CLI::App& program, PendingRun& pending);
 void AddDeviceList(CLI::App& device, PendingRun& pending);
 void AddEvalLines(CLI::App& eval, PendingRun& pending);

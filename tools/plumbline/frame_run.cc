@@ -21,24 +21,12 @@ namespace {
 constexpr int64_t kSameFrameNs = 1'000'000;
 constexpr int64_t kWaitNs = 1'000'000'000;
 
-/// "CM,DEG" into the norms of the prior's uncertainty.
-Outcome ParsePriorSize(const std::string& text, PosePrior* out_prior) {
-  const std::vector<DataLine> lines = DataLines(text);
-  if (lines.size() == 1 && lines[0].fields.size() == 2) {
-    const Result<double> cm = ParseNumber(lines[0].fields[0]);
-    const Result<double> deg = ParseNumber(lines[0].fields[1]);
-    if (cm && deg && *cm > 0.0 && *deg > 0.0) {
-      out_prior->position_sigma_m = *cm / 100.0;
-      out_prior->rotation_sigma_rad = *deg * std::numbers::pi / 180.0;
-      return std::nullopt;
-    }
-  }
-  return Failure{kExitUsage, "--prior-size " + text + ": want two positive numbers, CM,DEG"};
-}
-
 Outcome ReadPriors(const FrameRunOptions& options, FrameRun* run) {
+  double cm = 0.0, deg = 0.0;
+  if (Outcome failed = ParsePriorSize(options.prior_size, &cm, &deg)) return failed;
   PosePrior prior;
-  if (Outcome failed = ParsePriorSize(options.prior_size, &prior)) return failed;
+  prior.position_sigma_m = cm / 100.0;
+  prior.rotation_sigma_rad = deg * std::numbers::pi / 180.0;
   const Result<Trajectory> poses = ReadTumTrajectory(options.priors);
   if (!poses) return FailureFrom(poses.error());
   size_t num_missing = 0;
@@ -110,6 +98,20 @@ class ResultPump {
 };
 
 }  // namespace
+
+Outcome ParsePriorSize(const std::string& text, double* out_cm, double* out_deg) {
+  const std::vector<DataLine> lines = DataLines(text);
+  if (lines.size() == 1 && lines[0].fields.size() == 2) {
+    const Result<double> cm = ParseNumber(lines[0].fields[0]);
+    const Result<double> deg = ParseNumber(lines[0].fields[1]);
+    if (cm && deg && *cm > 0.0 && *deg > 0.0) {
+      *out_cm = *cm;
+      *out_deg = *deg;
+      return std::nullopt;
+    }
+  }
+  return Failure{kExitUsage, "--prior-size " + text + ": want two positive numbers, CM,DEG"};
+}
 
 void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
   command

@@ -38,6 +38,7 @@ void AddCommands(CLI::App& program, PendingRun& pending) {
   CLI::App& bench = AddGroup(program, "bench", "Measure speed");
   AddBenchNet(bench, pending);
   AddBenchFrame(bench, pending);
+  AddBenchRefine(bench, pending);
   AddSynth(program, pending);
   CLI::App& device = AddGroup(program, "device", "Compute devices");
   AddDeviceList(device, pending);

@@ -50,6 +50,14 @@ class BoxTree {
   /// Calls visit(box index) for every box whose node and ancestors pass keep(node index).
   template <typename Keep, typename Visit>
   void ForEach(Keep keep, Visit visit) const {
+    ForEachRange(keep, [&](uint32_t begin, uint32_t end) {
+      for (uint32_t i = begin; i < end; ++i) visit(order_[i]);
+    });
+  }
+
+  /// Calls visit(begin, end), a range of order(), for every leaf that passes with its ancestors.
+  template <typename Keep, typename Visit>
+  void ForEachRange(Keep keep, Visit visit) const {
     uint32_t node = 0;
     while (node < nodes_.size()) {
       if (!keep(node)) {
@@ -57,7 +65,7 @@ class BoxTree {
         continue;
       }
       if (nodes_[node].second_child == 0) {
-        for (uint32_t i = nodes_[node].begin; i < nodes_[node].end; ++i) visit(order_[i]);
+        visit(nodes_[node].begin, nodes_[node].end);
       }
       ++node;  // the first child, or what follows a leaf
     }

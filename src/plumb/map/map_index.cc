@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "plumb/geometry/line_projection.h"
@@ -36,6 +37,15 @@ class Frustum {
     slack_ = 1e-9 * (1.0 + cam_from_world.translation.norm());
   }
 
+  /// Whether no plane has the whole segment outside.
+  bool MayContain(const Segment3& segment) const {
+    for (size_t i = 0; i < normals_.size(); ++i) {
+      const double a = normals_[i].dot(segment.start), b = normals_[i].dot(segment.end);
+      if (std::max(a, b) + offsets_[i] < -slack_) return false;
+    }
+    return true;
+  }
+
   bool MayContain(const Box& box) const {
     for (size_t i = 0; i < normals_.size(); ++i) {
       if (box.Support(normals_[i]) + offsets_[i] < -slack_) return false;
@@ -49,16 +59,24 @@ class Frustum {
   double slack_ = 0.0;
 };
 
+/// What decides whether a line is visible.
+struct Entry {
+  Segment3 segment;
+  uint32_t line = 0;
+  uint32_t num_observing = 0;
+  uint32_t sightings_begin = 0, sightings_end = 0;
+};
+
 /// Whether one camera sees a line, or may see something of a box of lines.
 class ViewTest {
  public:
-  /// @param counts  For each key frame, whether its sightings count; borrowed.
-  ViewTest(const LineMap& map, const Camera& camera, const Rigid3& cam_from_world,
-           const VisibilityOptions& options, const std::vector<uint8_t>& counts)
-      : map_(map),
-        camera_(camera),
+  /// @param key_frames  Whose sightings count, borrowed; none: all.
+  ViewTest(const Camera& camera, const Rigid3& cam_from_world, const VisibilityOptions& options,
+           std::span<const LineSighting> sightings, std::span<const uint32_t> key_frames)
+      : camera_(camera),
         options_(options),
-        counts_(counts),
+        sightings_(sightings),
+        key_frames_(key_frames),
         frustum_(camera, cam_from_world, options.margin_px),
         rotation_(cam_from_world.RotationMatrix()),
         translation_(cam_from_world.translation),
@@ -73,36 +91,46 @@ class ViewTest {
            frustum_.MayContain(box);
   }
 
-  bool Shows(uint32_t line) const {
-    const MapLine& candidate = map_.lines[line];
-    const Segment3& segment = candidate.segment_in_world;
-    if (candidate.num_observing < options_.min_observing || !IsSeenAlike(line)) return false;
+  /// Length of the visible part [px], or a negative number.
+  double Shows(const Entry& entry) const {
+    const Segment3& segment = entry.segment;
+    if (entry.num_observing < options_.min_observing || !frustum_.MayContain(segment) ||
+        !IsSeenAlike(entry)) {
+      return -1.0;
+    }
     const auto visible = ProjectSegmentInCam(
         camera_, {rotation_ * segment.start + translation_, rotation_ * segment.end + translation_},
         options_.margin_px);
-    return visible && visible->Length() >= options_.min_length_px;
+    const double length = visible ? visible->Length() : -1.0;
+    return length >= options_.min_length_px ? length : -1.0;
   }
 
  private:
+  bool Counts(uint32_t key_frame) const {
+    return key_frames_.empty() ||
+           std::find(key_frames_.begin(), key_frames_.end(), key_frame) != key_frames_.end();
+  }
+
   /// Some key frame saw the line from a like direction and distance.
-  bool IsSeenAlike(uint32_t line) const {
-    const Eigen::Vector3d ray = center_ - map_.lines[line].segment_in_world.Midpoint();
+  bool IsSeenAlike(const Entry& entry) const {
+    const Eigen::Vector3d ray = center_ - entry.segment.Midpoint();
     const double distance = ray.norm(), ratio = options_.max_distance_ratio;
-    for (const LineSighting& sighting : map_.SightingsOf(line)) {
+    for (uint32_t i = entry.sightings_begin; i < entry.sightings_end; ++i) {
+      const LineSighting& sighting = sightings_[i];
       const double seen_from = static_cast<double>(sighting.distance_m);
-      if (counts_[sighting.key_frame] != 0 && distance < ratio * seen_from &&
-          seen_from < ratio * distance &&
-          sighting.direction_to_camera.cast<double>().dot(ray) > min_cosine_ * distance) {
+      if (distance < ratio * seen_from && seen_from < ratio * distance &&
+          sighting.direction_to_camera.cast<double>().dot(ray) > min_cosine_ * distance &&
+          Counts(sighting.key_frame)) {
         return true;
       }
     }
     return false;
   }
 
-  const LineMap& map_;
   const Camera& camera_;
   const VisibilityOptions& options_;
-  const std::vector<uint8_t>& counts_;
+  std::span<const LineSighting> sightings_;
+  std::span<const uint32_t> key_frames_;
   Frustum frustum_;
   Eigen::Matrix3d rotation_;
   Eigen::Vector3d translation_, center_;
@@ -151,6 +179,18 @@ struct MapIndex::Impl {
         }
       }
     }
+    entries.reserve(map.lines.size());
+    sightings.reserve(map.sightings.size());
+    for (const uint32_t line : lines.order()) {
+      Entry& entry = entries.emplace_back();
+      entry.segment = map.lines[line].segment_in_world;
+      entry.line = line;
+      entry.num_observing = map.lines[line].num_observing;
+      entry.sightings_begin = static_cast<uint32_t>(sightings.size());
+      const auto seen = map.SightingsOf(line);
+      sightings.insert(sightings.end(), seen.begin(), seen.end());
+      entry.sightings_end = static_cast<uint32_t>(sightings.size());
+    }
     for (const KeyFrame& key_frame : map.key_frames) {
       axes.push_back(OpticalAxis(key_frame.cam_from_world));
       centers.push_back(key_frame.cam_from_world.Center());
@@ -181,9 +221,34 @@ struct MapIndex::Impl {
     return best;
   }
 
+  /// Calls visit(line, length) for every visible line.
+  template <typename Visit>
+  void ForEachVisible(const Camera& camera, const Rigid3& cam_from_world,
+                      const VisibilityOptions& options, Visit visit) const {
+    if (!camera.IsValid() || !cam_from_world.IsFinite()) return;
+    // The work space lives as long as the thread.
+    thread_local std::vector<uint32_t> nearest;
+    nearest.clear();
+    for (const auto& [cost, k] : Nearest(cam_from_world, options.nearest_key_frames)) {
+      nearest.push_back(k);
+    }
+    if (options.nearest_key_frames > 0 && nearest.empty()) return;
+    const ViewTest view(camera, cam_from_world, options, sightings, nearest);
+    lines.ForEachRange(
+        [&](uint32_t node) { return view.MayShow(lines.nodes()[node].box, reach_m[node]); },
+        [&](uint32_t begin, uint32_t end) {
+          for (uint32_t i = begin; i < end; ++i) {
+            const double length = view.Shows(entries[i]);
+            if (length >= 0.0) visit(entries[i].line, length);
+          }
+        });
+  }
+
   const LineMap& map;
   BoxTree lines, key_frames;
-  std::vector<double> reach_m;  // a node of `lines`
+  std::vector<Entry> entries;           // in the order of `lines`
+  std::vector<LineSighting> sightings;  // of the entries
+  std::vector<double> reach_m;          // a node of `lines`
   std::vector<Eigen::Vector3d> axes, centers;
 };
 
@@ -198,29 +263,18 @@ void MapIndex::VisibleLines(const Camera& camera, const Rigid3& cam_from_world,
                             const VisibilityOptions& options,
                             std::vector<uint32_t>* out_lines) const {
   out_lines->clear();
-  if (!camera.IsValid() || !cam_from_world.IsFinite()) return;
-  // The work space lives as long as the thread.
-  thread_local std::vector<uint8_t> counts;
-  thread_local std::vector<uint64_t> marks;  // one bit a line: ascending without sorting
-  counts.assign(impl_->map.key_frames.size(), options.nearest_key_frames == 0 ? 1 : 0);
-  for (const auto& [cost, k] : impl_->Nearest(cam_from_world, options.nearest_key_frames)) {
-    counts[k] = 1;
-  }
-  marks.assign((impl_->map.lines.size() + 63) / 64, 0);
+  impl_->ForEachVisible(camera, cam_from_world, options,
+                        [&](uint32_t line, double) { out_lines->push_back(line); });
+  std::sort(out_lines->begin(), out_lines->end());
+}
 
-  const ViewTest view(impl_->map, camera, cam_from_world, options, counts);
-  impl_->lines.ForEach(
-      [&](uint32_t node) {
-        return view.MayShow(impl_->lines.nodes()[node].box, impl_->reach_m[node]);
-      },
-      [&](uint32_t line) {
-        if (view.Shows(line)) marks[line / 64] |= uint64_t{1} << line % 64;
-      });
-  for (size_t word = 0; word < marks.size(); ++word) {
-    for (uint64_t rest = marks[word]; rest != 0; rest &= rest - 1) {
-      out_lines->push_back(static_cast<uint32_t>(64 * word + std::countr_zero(rest)));
-    }
-  }
+void MapIndex::VisibleLines(const Camera& camera, const Rigid3& cam_from_world,
+                            const VisibilityOptions& options,
+                            std::vector<VisibleLine>* out_lines) const {
+  out_lines->clear();
+  impl_->ForEachVisible(camera, cam_from_world, options, [&](uint32_t line, double length) {
+    out_lines->push_back({line, static_cast<float>(length)});
+  });
 }
 
 void MapIndex::NearestKeyFrames(const Rigid3& cam_from_world, uint32_t count,

@@ -25,6 +25,14 @@ void ProjectedLines::Reserve(size_t count) {
   }
 }
 
+void ProjectedLines::Resize(size_t count) {
+  line.resize(count);
+  for (std::vector<float>* column : {&x, &y, &direction_x, &direction_y, &length, &angle, &weight,
+                                     &start_x, &start_y, &start_z, &end_x, &end_y, &end_z}) {
+    column->resize(count);
+  }
+}
+
 void ProjectCandidates(const Camera& camera, const Rigid3& cam_from_world,
                        std::span<const CandidateLine> lines, double min_length_px,
                        ProjectedLines* out) {

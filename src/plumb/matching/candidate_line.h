@@ -31,10 +31,13 @@ struct ProjectedLines {
   std::vector<float> length;                    // [px]
   std::vector<float> angle;                     // of the direction, [0, pi)
   std::vector<float> weight;
+  /// The whole lines' ends in the camera [m]; only ProjectTable() fills them.
+  std::vector<float> start_x, start_y, start_z, end_x, end_y, end_z;
 
   size_t size() const { return line.size(); }
   void Clear();
   void Reserve(size_t count);
+  void Resize(size_t count);
 };
 
 /// Projects the candidates, clipped to the near plane and the image, and keeps those of which more

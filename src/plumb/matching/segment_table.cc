@@ -10,6 +10,7 @@ namespace plumb {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
+constexpr float kFarAwayPx = 1e8f;
 
 }  // namespace
 
@@ -41,12 +42,21 @@ void SegmentTable::Assign(std::span<const Segment2> segments) {
     length.push_back(static_cast<float>(pixels));
     angle.push_back(UndirectedAngle(segment.Delta()));
   }
+  for (std::vector<float>* column : {&x0, &y0, &x1, &y1}) {
+    column->insert(column->end(), kLanes, kFarAwayPx);
+  }
+  for (std::vector<float>* column : {&direction_x, &direction_y, &length}) {
+    column->insert(column->end(), kLanes, 0.0f);
+  }
 }
 
 std::array<SegmentTable::Range, 2> SegmentTable::NearAngle(float around, float max_sine) const {
-  const uint32_t count = static_cast<uint32_t>(angle.size());
   // A little wider than asked, so that rounding never loses a row; callers test the sine itself.
-  const float half = max_sine < 1.0f ? std::asin(max_sine) + 1e-4f : kPi;
+  return Within(around, max_sine < 1.0f ? std::asin(max_sine) + 1e-4f : kPi);
+}
+
+std::array<SegmentTable::Range, 2> SegmentTable::Within(float around, float half) const {
+  const uint32_t count = static_cast<uint32_t>(angle.size());
   if (half >= 0.5f * kPi) return {Range{0, count}, Range{}};
   const auto first_at_least = [&](float value) {
     return static_cast<uint32_t>(std::lower_bound(angle.begin(), angle.end(), value) -

@@ -10,9 +10,13 @@
 
 namespace plumb {
 
-/// Parallel arrays, ascending in `angle`; ties keep the order of the input.
+/// Parallel arrays, ascending in `angle`; ties keep the order of the input. All but `source` and
+/// `angle` are followed by kLanes rows of padding that overlap nothing, so that loops over a range
+/// may run on to a multiple of kLanes.
 class SegmentTable {
  public:
+  static constexpr uint32_t kLanes = 8;
+
   /// Half-open range of rows.
   struct Range {
     uint32_t begin = 0, end = 0;
@@ -27,6 +31,8 @@ class SegmentTable {
   /// Rows whose direction makes an angle of at most asin(max_sine) with `angle` (in [0, pi)), as up
   /// to two ranges; the second is empty when the angles do not wrap around.
   std::array<Range, 2> NearAngle(float angle, float max_sine) const;
+  /// The same for a half width in radians; rounding is the caller's.
+  std::array<Range, 2> Within(float angle, float half_width_rad) const;
 
   std::vector<uint32_t> source;                 // index into the input
   std::vector<float> x0, y0, x1, y1;            // end points [px]

@@ -1,41 +1,86 @@
 #include "plumb/matching/support.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "plumb/base/simd_clones.h"
 
 namespace plumb {
 namespace {
 
+constexpr size_t kLanes = SegmentTable::kLanes;
 constexpr float kMaxSine = 0.12f;
+constexpr float kHalfWidth = 0.126f;  // asin(0.12), and what lines do not know of their angle
 constexpr float kMinOverlapPx = 8.0f;
 constexpr float kInverseSquareScale = 1.0f / (2.0f * 2.0f);  // Geman-McClure at 2 px
 constexpr float kLengthCapPx = 150.0f;
 
+struct Line {
+  float x, y, direction_x, direction_y, length, weight;
+};
+
+/// @return the line's best support by one of `count` segments; `best` are the segments' own.
+/// Supports are not negative, so that their bits order as integers do: that maximum vectorises.
+PLUMB_SIMD_CLONES float SupportKernel(const Line line, size_t count, const float* __restrict x0,
+                                      const float* __restrict y0, const float* __restrict x1,
+                                      const float* __restrict y1, const float* __restrict dx,
+                                      const float* __restrict dy, float* __restrict best) {
+  int32_t line_best = 0;
+  for (size_t k = 0; k < count; ++k) {
+    const float ax = x0[k] - line.x, ay = y0[k] - line.y;
+    const float bx = x1[k] - line.x, by = y1[k] - line.y;
+    const float along_a = ax * line.direction_x + ay * line.direction_y;
+    const float along_b = bx * line.direction_x + by * line.direction_y;
+    const float across_a = ay * line.direction_x - ax * line.direction_y;
+    const float across_b = by * line.direction_x - bx * line.direction_y;
+    const float first = std::max(std::min(along_a, along_b), 0.0f);
+    const float last = std::min(std::max(along_a, along_b), line.length);
+    const float extent = along_b - along_a;
+    const float inverse = 1.0f / (std::abs(extent) < 1e-6f ? 1e-6f : extent);
+    const float slope = (across_b - across_a) * inverse;
+    const float h0 = across_a + (first - along_a) * slope;
+    const float h1 = across_a + (last - along_a) * slope;
+    const float sine = std::abs(line.direction_x * dy[k] - line.direction_y * dx[k]);
+    const float overlap = last - first;
+    const float q = 1.0f / (1.0f + 0.5f * (h0 * h0 + h1 * h1) * kInverseSquareScale);
+    // A mask, since a condition would become a branch.
+    const int32_t counts = (overlap > kMinOverlapPx) & (sine < kMaxSine);
+    const int32_t support = std::bit_cast<int32_t>(overlap * q * q) & -counts;
+    line_best = std::max(line_best, support);
+    best[k] = std::max(best[k], std::bit_cast<float>(support) * line.weight);
+  }
+  return std::bit_cast<float>(line_best);
+}
+
 }  // namespace
 
 PoseSupport SupportMeter::Measure(const ProjectedLines& lines, const SegmentTable& segments) {
-  columns_.Reserve(segments.size());
-  best_.assign(segments.size(), 0.0f);
+  best_.assign(segments.size() + kLanes, 0.0f);
   double explained = 0.0, visible = 0.0;
   for (size_t i = 0; i < lines.size(); ++i) {
-    const float weight = lines.weight[i];
+    if (!(lines.length[i] > 0.0f)) continue;
+    const Line line{lines.x[i],           lines.y[i],      lines.direction_x[i],
+                    lines.direction_y[i], lines.length[i], lines.weight[i]};
     float line_best = 0.0f;
-    for (const SegmentTable::Range range : segments.NearAngle(lines.angle[i], kMaxSine)) {
-      MeasureOverlaps(lines, i, segments, range, &columns_);
-      for (uint32_t k = 0; k < range.end - range.begin; ++k) {
-        const float overlap = columns_.overlap[k];
-        if (!(overlap > kMinOverlapPx) || !(columns_.sine[k] < kMaxSine)) continue;
-        const float q = 1.0f / (1.0f + columns_.square[k] * kInverseSquareScale);
-        const float support = overlap * q * q;
-        line_best = std::max(line_best, support);
-        float& segment_best = best_[range.begin + k];
-        segment_best = std::max(segment_best, support * weight);
-      }
+    for (const SegmentTable::Range range : segments.Within(lines.angle[i], kHalfWidth)) {
+      const size_t b = range.begin, count = range.end - range.begin;
+      if (count == 0) continue;
+      // Rows after the range are too slanted to count, or padding.
+      line_best =
+          std::max(line_best, SupportKernel(line, (count + kLanes - 1) / kLanes * kLanes,
+                                            segments.x0.data() + b, segments.y0.data() + b,
+                                            segments.x1.data() + b, segments.y1.data() + b,
+                                            segments.direction_x.data() + b,
+                                            segments.direction_y.data() + b, best_.data() + b));
     }
-    explained += static_cast<double>(weight) * std::min(line_best, kLengthCapPx);
-    visible += static_cast<double>(weight) * std::min(lines.length[i], kLengthCapPx);
+    explained += static_cast<double>(line.weight) * std::min(line_best, kLengthCapPx);
+    visible += static_cast<double>(line.weight) * std::min(line.length, kLengthCapPx);
   }
   PoseSupport support;
-  for (const float best : best_) support.detected_px += std::min(best, kLengthCapPx);
+  for (size_t row = 0; row < segments.size(); ++row) {
+    support.detected_px += std::min(best_[row], kLengthCapPx);
+  }
   support.map_share = explained / std::max(visible, 1.0);
   return support;
 }

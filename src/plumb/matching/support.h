@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "plumb/matching/candidate_line.h"
-#include "plumb/matching/overlap.h"
 #include "plumb/matching/segment_table.h"
 
 namespace plumb {
@@ -25,7 +24,6 @@ class SupportMeter {
   PoseSupport Measure(const ProjectedLines& lines, const SegmentTable& segments);
 
  private:
-  OverlapColumns columns_;
   std::vector<float> best_;  // per table row
 };
 

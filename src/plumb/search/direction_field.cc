@@ -32,9 +32,8 @@ void DirectionField::Assign(int image_width_px, int image_height_px,
   border_ = kBorderPx / cell_px_;
   width_ = image_width_px / cell_px_ + 2 * border_;
   height_ = image_height_px / cell_px_ + 2 * border_;
-  Cell far;
-  far.fill(static_cast<uint8_t>(kTruncationPx / unit_px() + 0.5f));
-  cells_.assign(static_cast<size_t>(width_) * static_cast<size_t>(height_), far);
+  far_.fill(static_cast<uint8_t>(kTruncationPx / unit_px() + 0.5f));
+  cells_.assign(static_cast<size_t>(width_) * static_cast<size_t>(height_), far_);
   for (const Segment2& segment : segments) {
     const Eigen::Vector2d delta = segment.Delta();
     const double angle = std::atan2(delta.y(), delta.x());
@@ -61,9 +60,8 @@ void DirectionField::Draw(const Segment2& segment, const Cell& keep) {
     const Eigen::Vector2d point = start + static_cast<double>(k) / steps * delta;
     const double x = std::floor(point.x() + 0.5), y = std::floor(point.y() + 0.5);
     if (!(x >= 0.0 && x < width_ && y >= 0.0 && y < height_)) continue;
-    Cell& cell = cells_[Index(static_cast<int>(y), static_cast<int>(x))];
-    for (int c = 0; c < kChannels; ++c)
-      cell[static_cast<size_t>(c)] &= keep[static_cast<size_t>(c)];
+    uint8_t* const cell = cells_[Index(static_cast<int>(y), static_cast<int>(x))].data();
+    Store(Load(cell) & Load(keep.data()), cell);
   }
 }
 
@@ -74,30 +72,40 @@ void DirectionField::Propagate() {
   const auto at = [&](int row, int column) {
     return base + static_cast<size_t>(row) * stride + static_cast<size_t>(column) * kChannels;
   };
+  // The neighbours above slide through registers; only the one to the side is waited for.
+  const Vector far = Load(far_.data());
   for (int row = 0; row < height_; ++row) {
+    uint8_t* p = at(row, 0);
+    const uint8_t* above = row > 0 ? p - stride : nullptr;
+    Vector side = far, left = far, up = above ? Load(above) : far;
     for (int column = 0; column < width_; ++column) {
-      uint8_t* const p = at(row, column);
-      Vector v = Load(p);
-      if (column > 0) v = Min(v, Load(p - kChannels) + kStraight);
-      if (row > 0) {
-        v = Min(v, Load(p - stride) + kStraight);
-        if (column > 0) v = Min(v, Load(p - stride - kChannels) + kDiagonal);
-        if (column + 1 < width_) v = Min(v, Load(p - stride + kChannels) + kDiagonal);
-      }
+      const bool last = column + 1 == width_;
+      const Vector right = above && !last ? Load(above + kChannels) : far;
+      Vector v = Min(Load(p), Min(up + kStraight, Min(left, right) + kDiagonal));
+      v = Min(v, side + kStraight);
       Store(v, p);
+      side = v;
+      left = up;
+      up = right;
+      p += kChannels;
+      if (above) above += kChannels;
     }
   }
   for (int row = height_ - 1; row >= 0; --row) {
+    uint8_t* p = at(row, width_ - 1);
+    const uint8_t* below = row + 1 < height_ ? p + stride : nullptr;
+    Vector side = far, right = far, down = below ? Load(below) : far;
     for (int column = width_ - 1; column >= 0; --column) {
-      uint8_t* const p = at(row, column);
-      Vector v = Load(p);
-      if (column + 1 < width_) v = Min(v, Load(p + kChannels) + kStraight);
-      if (row + 1 < height_) {
-        v = Min(v, Load(p + stride) + kStraight);
-        if (column > 0) v = Min(v, Load(p + stride - kChannels) + kDiagonal);
-        if (column + 1 < width_) v = Min(v, Load(p + stride + kChannels) + kDiagonal);
-      }
+      const bool last = column == 0;
+      const Vector left = below && !last ? Load(below - kChannels) : far;
+      Vector v = Min(Load(p), Min(down + kStraight, Min(left, right) + kDiagonal));
+      v = Min(v, side + kStraight);
       Store(v, p);
+      side = v;
+      right = down;
+      down = left;
+      p -= kChannels;
+      if (below) below -= kChannels;
     }
   }
 }

@@ -54,6 +54,7 @@ class DirectionField {
   void Propagate();
 
   int cell_px_ = 2, border_ = 0, width_ = 0, height_ = 0;
+  Cell far_{};  // of a cell that sees nothing
   std::vector<Cell> cells_;
 };
 

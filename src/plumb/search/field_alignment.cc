@@ -13,15 +13,26 @@ namespace {
 
 constexpr double kMaxRotationStep = 0.08;
 constexpr double kDamping = 1e-3;
+// A step that moves the image, at this depth, by so small a share of sigma is the last of its
+// level.
+constexpr double kUsualDepthM = 2.0, kConvergedShare = 0.05;
 // Samples within half a pixel of the truncation see no segment.
 constexpr float kMaxDistancePx = DirectionField::kTruncationPx - 0.5f;
 
-PLUMB_SIMD_CLONES void JacobianKernel(
-    size_t count, float fx, float fy, float inverse_sigma, float scale, const float* __restrict x,
-    const float* __restrict y, const float* __restrict iz, const float* __restrict distance,
-    const float* __restrict gradient_x, const float* __restrict gradient_y,
-    float* __restrict weight, float* __restrict j0, float* __restrict j1, float* __restrict j2,
-    float* __restrict j3, float* __restrict j4, float* __restrict j5) {
+/// Where a sample lies among the cells, as LookUp() rounds it.
+struct CellGrid {
+  float fx, fy, cx, cy, cell_px;
+};
+
+PLUMB_SIMD_CLONES void JacobianKernel(size_t count, float fx, float fy, const CellGrid grid,
+                                      float inverse_sigma, float scale, const float* __restrict x,
+                                      const float* __restrict y, const float* __restrict iz,
+                                      float* __restrict distance,
+                                      const float* __restrict gradient_x,
+                                      const float* __restrict gradient_y, float* __restrict weight,
+                                      float* __restrict j0, float* __restrict j1,
+                                      float* __restrict j2, float* __restrict j3,
+                                      float* __restrict j4, float* __restrict j5) {
   for (size_t k = 0; k < count; ++k) {
     const float gu = gradient_x[k] * fx, gv = gradient_y[k] * fy;
     const float u = x[k], v = y[k], inverse = iz[k];
@@ -32,9 +43,17 @@ PLUMB_SIMD_CLONES void JacobianKernel(
     j3[k] = gu * inverse;
     j4[k] = gv * inverse;
     j5[k] = -radial * inverse;
-    const float r = distance[k] * inverse_sigma;
+    // From the cell's centre to the sample.
+    const float column = grid.fx * u + grid.cx, row = grid.fy * v + grid.cy;
+    const float dx = column - static_cast<float>(static_cast<int32_t>(column)) - 0.5f;
+    const float dy = row - static_cast<float>(static_cast<int32_t>(row)) - 0.5f;
+    const float at_center = distance[k];
+    const float d =
+        std::max(at_center + (gradient_x[k] * dx + gradient_y[k] * dy) * grid.cell_px, 0.0f);
+    distance[k] = d;
+    const float r = d * inverse_sigma;
     const float q = 1.0f / (1.0f + r * r);
-    weight[k] = distance[k] < kMaxDistancePx ? weight[k] * scale * q * q : 0.0f;
+    weight[k] = at_center < kMaxDistancePx ? weight[k] * scale * q * q : 0.0f;
   }
 }
 
@@ -43,10 +62,29 @@ PLUMB_SIMD_CLONES void Multiply(size_t count, const float* __restrict a, const f
   for (size_t k = 0; k < count; ++k) product[k] = a[k] * b[k];
 }
 
-PLUMB_SIMD_CLONES float Dot(size_t count, const float* __restrict a, const float* __restrict b) {
-  float sum = 0.0f;
-  for (size_t k = 0; k < count; ++k) sum += a[k] * b[k];
-  return sum;
+/// Products of one column with the six of the Jacobian and the residuals.
+PLUMB_SIMD_CLONES void Dots(size_t count, const float* __restrict a, const float* __restrict b0,
+                            const float* __restrict b1, const float* __restrict b2,
+                            const float* __restrict b3, const float* __restrict b4,
+                            const float* __restrict b5, const float* __restrict b6,
+                            float* __restrict sums) {
+  float s0 = 0.0f, s1 = 0.0f, s2 = 0.0f, s3 = 0.0f, s4 = 0.0f, s5 = 0.0f, s6 = 0.0f;
+  for (size_t k = 0; k < count; ++k) {
+    s0 += a[k] * b0[k];
+    s1 += a[k] * b1[k];
+    s2 += a[k] * b2[k];
+    s3 += a[k] * b3[k];
+    s4 += a[k] * b4[k];
+    s5 += a[k] * b5[k];
+    s6 += a[k] * b6[k];
+  }
+  sums[0] = s0;
+  sums[1] = s1;
+  sums[2] = s2;
+  sums[3] = s3;
+  sums[4] = s4;
+  sums[5] = s5;
+  sums[6] = s6;
 }
 
 }  // namespace
@@ -66,6 +104,11 @@ RelativePose FieldAligner::Align(const Camera& camera, const DirectionField& fie
   // A byte's difference over two cells, in pixels per pixel.
   const float slope = unit / (2.0f * static_cast<float>(field.cell_px()));
   const ptrdiff_t row = static_cast<ptrdiff_t>(field.width()) * DirectionField::kChannels;
+  const double cells = 1.0 / field.cell_px();
+  const CellGrid grid{static_cast<float>(camera.fx * cells), static_cast<float>(camera.fy * cells),
+                      static_cast<float>(camera.cx * cells + field.border_cells() + 0.5),
+                      static_cast<float>(camera.cy * cells + field.border_cells() + 0.5),
+                      static_cast<float>(field.cell_px())};
   Vector6d prior;
   prior << Eigen::Vector3d::Constant(std::pow(options.prior_rotation_sigma_rad, -2)),
       Eigen::Vector3d::Constant(std::pow(options.prior_position_sigma_m, -2));
@@ -81,7 +124,7 @@ RelativePose FieldAligner::Align(const Camera& camera, const DirectionField& fie
           slope * static_cast<float>(p[DirectionField::kChannels] - p[-DirectionField::kChannels]);
       gradient_y_[k] = slope * static_cast<float>(p[row] - p[-row]);
     }
-    JacobianKernel(count, static_cast<float>(camera.fx), static_cast<float>(camera.fy),
+    JacobianKernel(count, static_cast<float>(camera.fx), static_cast<float>(camera.fy), grid,
                    inverse_sigma, scale, lookups_.x.data(), lookups_.y.data(),
                    lookups_.inverse_depth.data(), distance_.data(), gradient_x_.data(),
                    gradient_y_.data(), lookups_.weight.data(), jacobian_[0].data(),
@@ -91,10 +134,11 @@ RelativePose FieldAligner::Align(const Camera& camera, const DirectionField& fie
     Vector6d gradient;
     for (int i = 0; i < 6; ++i) {
       Multiply(count, jacobian_[i].data(), lookups_.weight.data(), weighted_.data());
-      for (int j = i; j < 6; ++j) {
-        information(j, i) = Dot(count, weighted_.data(), jacobian_[j].data());
-      }
-      gradient[i] = Dot(count, weighted_.data(), distance_.data());
+      float sums[7];
+      Dots(count, weighted_.data(), jacobian_[0].data(), jacobian_[1].data(), jacobian_[2].data(),
+           jacobian_[3].data(), jacobian_[4].data(), jacobian_[5].data(), distance_.data(), sums);
+      for (int j = i; j < 6; ++j) information(j, i) = static_cast<double>(sums[j]);
+      gradient[i] = static_cast<double>(sums[6]);
     }
     const Rigid3 current = pose.After(Rigid3{});
     gradient += prior.cwiseProduct(Difference(current, Rigid3{}));
@@ -108,6 +152,9 @@ RelativePose FieldAligner::Align(const Camera& camera, const DirectionField& fie
     const Rigid3 next = Perturb(current, delta);
     pose.rotation = next.RotationMatrix().cast<float>();
     pose.translation = next.translation.cast<float>();
+    const double moved_px =
+        camera.MeanFocal() * (delta.head<3>().norm() + delta.tail<3>().norm() / kUsualDepthM);
+    if (moved_px < kConvergedShare * options.sigma_px) break;
   }
   return pose;
 }

@@ -18,8 +18,9 @@ struct FieldAlignmentOptions {
   double prior_rotation_sigma_rad = 0.05, prior_position_sigma_m = 0.15;
 };
 
-/// The residual of a sample is the field's distance, its gradient the central difference of its
-/// channel; weights w n / (1 + (r / sigma)^2)^2 / sigma^2, truncated samples left out.
+/// The residual of a sample is the distance of its cell, carried from the cell's centre to the
+/// sample along the gradient, the central difference of its channel; a step that hardly moves the
+/// image is the last; weights w n / (1 + (r / sigma)^2)^2 / sigma^2, truncated samples left out.
 /// Source: docs/method/association.md. Owns its work space; not thread-safe.
 class FieldAligner {
  public:

@@ -1,6 +1,7 @@
 #include "plumb/search/line_samples.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "plumb/geometry/line_projection.h"
@@ -13,13 +14,29 @@ constexpr int kMaxSamplesPerLine = 4;
 // A prior that is a little off must not lose the lines at the border.
 constexpr double kMarginPx = 100.0;
 
+std::array<std::vector<float>*, 7> ColumnsOf(LineSamples* samples) {
+  return {&samples->x,           &samples->y,           &samples->z,     &samples->direction_x,
+          &samples->direction_y, &samples->direction_z, &samples->weight};
+}
+
+/// Scales the weights and pads.
+void Finish(double total_weight, LineSamples* samples) {
+  samples->count = samples->weight.size();
+  if (total_weight > 0.0) {
+    for (float& weight : samples->weight) weight /= static_cast<float>(total_weight);
+  }
+  constexpr float kPadding[] = {0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.0f, 0.0f};
+  const std::array<std::vector<float>*, 7> columns = ColumnsOf(samples);
+  while (samples->weight.size() % LineSamples::kLanes != 0) {
+    for (size_t c = 0; c < columns.size(); ++c) columns[c]->push_back(kPadding[c]);
+  }
+}
+
 }  // namespace
 
 void SampleLines(const Camera& camera, const Rigid3& cam_from_world,
                  std::span<const SearchLine> lines, LineSamples* out) {
-  std::vector<float>* const columns[] = {&out->x,           &out->y,           &out->z,
-                                         &out->direction_x, &out->direction_y, &out->direction_z,
-                                         &out->weight};
+  const std::array<std::vector<float>*, 7> columns = ColumnsOf(out);
   for (std::vector<float>* column : columns) column->clear();
   double total = 0.0;
   for (const SearchLine& line : lines) {
@@ -38,18 +55,25 @@ void SampleLines(const Camera& camera, const Rigid3& cam_from_world,
           (segment.start + (k + 0.5) / samples * delta).template cast<float>();
       const float values[] = {point.x(),     point.y(),     point.z(),    direction.x(),
                               direction.y(), direction.z(), float(weight)};
-      for (int c = 0; c < 7; ++c) columns[c]->push_back(values[c]);
+      for (size_t c = 0; c < 7; ++c) columns[c]->push_back(values[c]);
       total += weight;
     }
   }
-  out->count = out->weight.size();
-  if (total > 0.0) {
-    for (float& weight : out->weight) weight /= static_cast<float>(total);
+  Finish(total, out);
+}
+
+void TakeEvery(const LineSamples& samples, size_t stride, LineSamples* out) {
+  const std::array<const std::vector<float>*, 7> in = {
+      &samples.x,           &samples.y,           &samples.z,     &samples.direction_x,
+      &samples.direction_y, &samples.direction_z, &samples.weight};
+  const std::array<std::vector<float>*, 7> columns = ColumnsOf(out);
+  for (std::vector<float>* column : columns) column->clear();
+  double total = 0.0;
+  for (size_t k = stride / 2; k < samples.count; k += stride) {
+    for (size_t c = 0; c < columns.size(); ++c) columns[c]->push_back((*in[c])[k]);
+    total += static_cast<double>(samples.weight[k]);
   }
-  const float padding[] = {0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.0f, 0.0f};
-  while (out->weight.size() % LineSamples::kLanes != 0) {
-    for (int c = 0; c < 7; ++c) columns[c]->push_back(padding[c]);
-  }
+  Finish(total, out);
 }
 
 }  // namespace plumb

@@ -32,4 +32,7 @@ struct LineSamples {
 void SampleLines(const Camera& camera, const Rigid3& cam_from_world,
                  std::span<const SearchLine> lines, LineSamples* out);
 
+/// Every `stride`-th sample, beginning in the middle of a stride, with weights that sum to 1 again.
+void TakeEvery(const LineSamples& samples, size_t stride, LineSamples* out);
+
 }  // namespace plumb

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <numbers>
 
+#include "plumb/base/stopwatch.h"
+
 namespace plumb {
 namespace {
 
@@ -14,8 +16,11 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr int kMaxSearchWidthPx = 960, kReducedWidthPx = 640;
 
 constexpr DirectionFieldOptions kScoringField{.cell_px = 4, .tolerance_rad = 15.0 * kDegree};
-constexpr DirectionFieldOptions kAlignmentField{.cell_px = 2, .tolerance_rad = 10.0 * kDegree};
+constexpr DirectionFieldOptions kAlignmentField{.cell_px = 4, .tolerance_rad = 10.0 * kDegree};
 constexpr double kScoringSigmaPx = 20.0;
+// First pass: every so manieth sample; so small a share of the hypotheses enters the second.
+constexpr size_t kFewStride = 8, kSecondPassDivisor = 12, kMinSecondPass = 96;
+constexpr size_t kScoredAtOnce = 64;  // between two looks at the clock
 
 struct Level {
   double sigma_px;
@@ -32,6 +37,11 @@ constexpr double kPriorScale = 1.5;  // of the alignment's prior factor over the
 constexpr size_t kMaxClusters = 12;
 constexpr size_t kRotationSegments = 100;  // the longest; more do not change the ranking
 constexpr float kRotationJitter = static_cast<float>(0.5 * kDegree);
+
+// Ties by the order of drawing.
+constexpr auto kIsBetter = [](const auto& a, const auto& b) {
+  return a.score != b.score ? a.score > b.score : a.rank < b.rank;
+};
 
 constexpr double kDistinctPositionM = 0.02, kDistinctRotationRad = 0.01;
 
@@ -54,6 +64,8 @@ std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const Search
                                               std::span<const Segment2> segments,
                                               const PoseSearchOptions& options, uint64_t seed) {
   found_.clear();
+  times_ = {};
+  Stopwatch watch;
   const double scale = camera.width_px > kMaxSearchWidthPx
                            ? static_cast<double>(kReducedWidthPx) / camera.width_px
                            : 1.0;
@@ -72,8 +84,10 @@ std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const Search
   if (samples_.count == 0 || segments_.empty()) return found_;
 
   DrawHypotheses(region, lines, options, seed);
+  times_.draw_ns = watch.Lap();
   coarse_field_.Assign(camera_.width_px, camera_.height_px, segments_, kScoringField);
-  Rank(kScoringSigmaPx, coarse_field_);
+  times_.field_ns = watch.Lap();
+  RankAllInTwoPasses(options);
   // The prior itself always takes part.
   const size_t kept = std::min(options.num_aligned, hypotheses_.size());
   const auto prior = std::find_if(hypotheses_.begin(), hypotheses_.end(),
@@ -85,9 +99,12 @@ std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const Search
   } else {
     hypotheses_.resize(kept);
   }
+  times_.score_ns = watch.Lap();
   fine_field_.Assign(camera_.width_px, camera_.height_px, segments_, kAlignmentField);
-  Align(region);
+  times_.field_ns += watch.Lap();
+  Align(region, options);
   CollectSurvivors(region, options.num_survivors);
+  times_.align_ns = watch.Lap();
   return found_;
 }
 
@@ -130,29 +147,59 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
   }
 }
 
-void PoseSearch::Rank(double sigma_px, const DirectionField& field) {
-  scorer_.Prepare(camera_, field, sigma_px);
-  for (Hypothesis& h : hypotheses_) h.score = scorer_.Score(h.pose, samples_);
-  std::sort(hypotheses_.begin(), hypotheses_.end(), [](const Hypothesis& a, const Hypothesis& b) {
-    return a.score != b.score ? a.score > b.score : a.rank < b.rank;
-  });
+void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
+  const size_t num_second =
+      std::max({kMinSecondPass, options.num_aligned, hypotheses_.size() / kSecondPassDivisor});
+  if (num_second < hypotheses_.size()) {
+    TakeEvery(samples_, kFewStride, &few_samples_);
+    scorer_.Prepare(camera_, coarse_field_, kScoringSigmaPx);
+    size_t num_scored = 0;
+    while (num_scored < hypotheses_.size()) {
+      // Draws from the prior come first, each of them from all of the region.
+      const size_t end = std::min(num_scored + kScoredAtOnce, hypotheses_.size());
+      for (; num_scored < end; ++num_scored) {
+        Hypothesis& h = hypotheses_[num_scored];
+        h.score = scorer_.Score(h.pose, few_samples_);
+      }
+      if (num_scored >= num_second && options.deadline.HasPassed(options.score_share)) break;
+    }
+    hypotheses_.resize(num_scored);
+    // The prior itself, which comes first, always takes part.
+    if (num_second < hypotheses_.size()) {
+      std::nth_element(hypotheses_.begin() + 1,
+                       hypotheses_.begin() + static_cast<ptrdiff_t>(num_second), hypotheses_.end(),
+                       kIsBetter);
+      hypotheses_.resize(num_second);
+    }
+  }
+  Rank(kScoringSigmaPx, coarse_field_, samples_);
 }
 
-void PoseSearch::Align(const SearchRegion& region) {
+void PoseSearch::Rank(double sigma_px, const DirectionField& field, const LineSamples& samples) {
+  scorer_.Prepare(camera_, field, sigma_px);
+  for (Hypothesis& h : hypotheses_) h.score = scorer_.Score(h.pose, samples);
+  Sort();
+}
+
+void PoseSearch::Sort() { std::sort(hypotheses_.begin(), hypotheses_.end(), kIsBetter); }
+
+void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& options) {
   late_ = hypotheses_;
   for (size_t i = 0; i < std::size(kLevels); ++i) {
+    // The late ones enter in any case: better a few levels of all than all of a few.
+    if (i > kLateLevel && options.deadline.HasPassed(options.align_share)) return;
     const Level& level = kLevels[i];
     if (i == kLateLevel) hypotheses_.insert(hypotheses_.end(), late_.begin(), late_.end());
-    const FieldAlignmentOptions options{
+    const FieldAlignmentOptions alignment{
         .sigma_px = level.sigma_px,
         .num_steps = level.num_steps,
         .prior_rotation_sigma_rad = kPriorScale * region.rotation_sigma_rad,
         .prior_position_sigma_m = kPriorScale * region.position_sigma_m};
     for (Hypothesis& h : hypotheses_) {
-      h.pose = aligner_.Align(camera_, fine_field_, samples_, h.pose, options);
+      h.pose = aligner_.Align(camera_, fine_field_, samples_, h.pose, alignment);
     }
     if (hypotheses_.size() <= kMinAligned) continue;
-    Rank(level.sigma_px, fine_field_);
+    Rank(level.sigma_px, fine_field_, samples_);
     const size_t kept = std::max(kMinAligned, hypotheses_.size() / 2);
     DropDuplicates();
     if (hypotheses_.size() > kept) hypotheses_.resize(kept);
@@ -176,7 +223,7 @@ void PoseSearch::DropDuplicates() {
 }
 
 void PoseSearch::CollectSurvivors(const SearchRegion& region, size_t max_survivors) {
-  Rank(kFinalSigmaPx, fine_field_);
+  Rank(kFinalSigmaPx, fine_field_, samples_);
   for (const Hypothesis& h : hypotheses_) {
     if (found_.size() == max_survivors) return;
     const Rigid3 pose = h.pose.After(region.cam_from_world);

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "plumb/base/deadline.h"
 #include "plumb/geometry/camera.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
@@ -30,6 +31,17 @@ struct PoseSearchOptions {
   uint32_t num_hypotheses = 1500;
   size_t num_aligned = 32;   // best hypotheses that are aligned, beside the prior itself
   size_t num_survivors = 4;  // distinct poses returned at most
+  /// Shares of it after which no more hypotheses are scored, and none aligned further.
+  Deadline deadline = {};
+  double score_share = 0.35, align_share = 0.6;
+};
+
+/// Where the time of a search went [ns].
+struct PoseSearchTimes {
+  int64_t draw_ns = 0;   // samples, hypotheses, rotations first
+  int64_t field_ns = 0;  // distance fields
+  int64_t score_ns = 0;  // of all hypotheses
+  int64_t align_ns = 0;
 };
 
 struct FoundPose {
@@ -38,11 +50,12 @@ struct FoundPose {
 };
 
 /// Hypotheses from the prior (half of them with the rotation found first), scored on a direction
-/// field of quarter resolution. The best are aligned on one of half resolution while sigma shrinks
-/// from 30 to 3 px, and once more from 12 px only: at 30 px most starts run into one optimum, which
-/// need not be the right one. At each level duplicates and the worse half are dropped. Images wider
-/// than 960 px are searched as if 640 px wide. Equal inputs and seeds give equal results. Owns its
-/// work space, does not allocate once warm; not thread-safe. Source: docs/method/association.md.
+/// field of quarter resolution: all of them by an eighth of the samples, the better ones by all.
+/// The best are aligned on a second field, of less tolerant orientations, while sigma shrinks from
+/// 30 to 3 px, and once more from 12 px only: at 30 px most starts run into one optimum, which need
+/// not be the right one. At each level duplicates and the worse half are dropped. Images wider than
+/// 960 px are searched as if 640 px wide. Equal inputs and seeds give equal results. Owns its work
+/// space, does not allocate once warm; not thread-safe. Source: docs/method/association.md.
 class PoseSearch {
  public:
   /// @return up to num_survivors poses, best first, any two more than 2 cm or 0.01 rad apart; valid
@@ -51,6 +64,9 @@ class PoseSearch {
                                     std::span<const SearchLine> lines,
                                     std::span<const Segment2> segments,
                                     const PoseSearchOptions& options, uint64_t seed);
+
+  /// Of the last search.
+  const PoseSearchTimes& times() const { return times_; }
 
  private:
   struct Hypothesis {
@@ -61,14 +77,17 @@ class PoseSearch {
 
   void DrawHypotheses(const SearchRegion& region, std::span<const SearchLine> lines,
                       const PoseSearchOptions& options, uint64_t seed);
-  void Rank(double sigma_px, const DirectionField& field);
-  void Align(const SearchRegion& region);
+  void Rank(double sigma_px, const DirectionField& field, const LineSamples& samples);
+  void Sort();  // best first
+  /// Keeps the best by a few samples, then the best of those by all.
+  void RankAllInTwoPasses(const PoseSearchOptions& options);
+  void Align(const SearchRegion& region, const PoseSearchOptions& options);
   void DropDuplicates();
   void CollectSurvivors(const SearchRegion& region, size_t max_survivors);
 
   Camera camera_;                   // of the searched image
   std::vector<Segment2> segments_;  // in the searched image
-  LineSamples samples_;
+  LineSamples samples_, few_samples_;
   DirectionField coarse_field_, fine_field_;
   DirectionClusterer clusterer_;
   std::vector<SearchLine> lines_in_prior_;
@@ -79,6 +98,7 @@ class PoseSearch {
   FieldAligner aligner_;
   std::vector<Hypothesis> hypotheses_, late_;  // late_ are aligned from the smaller sigma on
   std::vector<FoundPose> found_;
+  PoseSearchTimes times_;
 };
 
 }  // namespace plumb

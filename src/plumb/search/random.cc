@@ -1,6 +1,5 @@
 #include "plumb/search/random.h"
 
-#include <cmath>
 #include <numbers>
 
 namespace plumb {
@@ -12,13 +11,16 @@ uint32_t Random::Below(uint32_t count) {
 }
 
 Eigen::Vector3f Random::Normal3(float sigma) {
-  float radius[2], angle[2];
-  for (int i = 0; i < 2; ++i) {
-    radius[i] = sigma * std::sqrt(-2.0f * std::log(1.0f - Uniform()));
-    angle[i] = 2.0f * std::numbers::pi_v<float> * Uniform();
+  // Four uniform numbers of 16 bits each: variance 4 / 12.
+  const float scale = sigma * std::numbers::sqrt3_v<float> * 0x1p-16f;
+  Eigen::Vector3f out;
+  for (int i = 0; i < 3; ++i) {
+    const uint64_t bits = Next();
+    const auto sum = static_cast<int32_t>((bits & 0xffff) + (bits >> 16 & 0xffff) +
+                                          (bits >> 32 & 0xffff) + (bits >> 48));
+    out[i] = scale * static_cast<float>(sum - 2 * 0xffff);
   }
-  return {radius[0] * std::cos(angle[0]), radius[0] * std::sin(angle[0]),
-          radius[1] * std::cos(angle[1])};
+  return out;
 }
 
 uint64_t MixSeeds(uint64_t a, uint64_t b) { return SplitMix64(SplitMix64(a).Next() ^ b).Next(); }

@@ -18,7 +18,8 @@ class Random : public SplitMix64 {
   float Uniform();
   /// Uniform in 0..count - 1, count > 0.
   uint32_t Below(uint32_t count);
-  /// Three independent normal numbers with the standard deviation `sigma` each (Box-Muller).
+  /// Three independent, nearly normal numbers with the standard deviation `sigma` each: sums of
+  /// four uniform ones, hence never beyond 3.47 sigma.
   Eigen::Vector3f Normal3(float sigma);
 };
 

@@ -2,57 +2,75 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include <Eigen/Geometry>
 
 #include "plumb/base/simd_clones.h"
-#include "plumb/geometry/rigid3.h"
 
 namespace plumb {
 namespace {
 
+constexpr size_t kLanes = 8, kMaxDirections = 16;
 constexpr double kLengthCapPx = 150.0;
 constexpr double kDegree = std::numbers::pi / 180.0;
 // A biweight of this half width has about the shape of a Gaussian of 1.5 deg.
 constexpr double kHalfWidth = 2.6 * 1.5 * kDegree;
 
-PLUMB_SIMD_CLONES void BestDirectionKernel(size_t count, float dx, float dy, float dz, float weight,
-                                           float inverse_square_width, const float* __restrict nx,
-                                           const float* __restrict ny, const float* __restrict nz,
-                                           float* __restrict best) {
-  for (size_t k = 0; k < count; ++k) {
-    const float sine = nx[k] * dx + ny[k] * dy + nz[k] * dz;
-    const float q = std::max(1.0f - sine * sine * inverse_square_width, 0.0f);
-    best[k] = std::max(best[k], weight * q * q);
-  }
-}
+struct Direction {
+  float x, y, z, weight;
+};
 
-PLUMB_SIMD_CLONES float WeightedSum(size_t count, const float* __restrict a,
-                                    const float* __restrict b) {
-  float sum = 0.0f;
-  for (size_t k = 0; k < count; ++k) sum += a[k] * b[k];
-  return sum;
+// Eight floats as one register, or two where there is none so wide.
+using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
+
+PLUMB_SIMD_CLONES float ScoreKernel(size_t count, const Direction* directions,
+                                    size_t num_directions, float inverse_square_width,
+                                    const float* nx, const float* ny, const float* nz,
+                                    const float* length) {
+  const Lanes zero = {};
+  Lanes sums = {};
+  for (size_t k = 0; k < count; k += kLanes) {
+    Lanes x, y, z, pixels;
+    std::memcpy(&x, nx + k, sizeof(x));
+    std::memcpy(&y, ny + k, sizeof(y));
+    std::memcpy(&z, nz + k, sizeof(z));
+    std::memcpy(&pixels, length + k, sizeof(pixels));
+    Lanes best = {};
+    for (size_t d = 0; d < num_directions; ++d) {
+      const Direction& to = directions[d];
+      const Lanes sine = x * to.x + y * to.y + z * to.z;
+      Lanes q = 1.0f - sine * sine * inverse_square_width;
+      q = q > zero ? q : zero;
+      const Lanes value = q * q * to.weight;
+      best = value > best ? value : best;
+    }
+    sums += best * pixels;
+  }
+  return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 }
 
 }  // namespace
 
 Eigen::Matrix3f RotationFromVector(const Eigen::Vector3f& w) {
-  return ExpSo3(w.cast<double>()).toRotationMatrix().cast<float>();
+  return Eigen::Quaternionf(1.0f, 0.5f * w.x(), 0.5f * w.y(), 0.5f * w.z())
+      .normalized()
+      .toRotationMatrix();
 }
 
 float RotationSearch::Score(const Eigen::Matrix3f& rotation,
                             std::span<const DirectionCluster> clusters) {
   static const float kInverseSquareWidth =
       static_cast<float>(1.0 / (std::sin(kHalfWidth) * std::sin(kHalfWidth)));
-  std::fill(best_.begin(), best_.end(), 0.0f);
-  for (const DirectionCluster& cluster : clusters) {
-    const Eigen::Vector3f d = rotation * cluster.direction;
-    BestDirectionKernel(best_.size(), d.x(), d.y(), d.z(), std::min(1.0f, 3.0f * cluster.weight),
-                        kInverseSquareWidth, normal_x_.data(), normal_y_.data(), normal_z_.data(),
-                        best_.data());
+  Direction directions[kMaxDirections];
+  const size_t count = std::min(clusters.size(), kMaxDirections);
+  for (size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3f d = rotation * clusters[i].direction;
+    directions[i] = {d.x(), d.y(), d.z(), std::min(1.0f, 3.0f * clusters[i].weight)};
   }
-  return WeightedSum(best_.size(), best_.data(), length_.data());
+  return ScoreKernel(length_.size(), directions, count, kInverseSquareWidth, normal_x_.data(),
+                     normal_y_.data(), normal_z_.data(), length_.data());
 }
 
 void RotationSearch::Search(const Camera& camera, std::span<const Segment2> segments,
@@ -71,7 +89,11 @@ void RotationSearch::Search(const Camera& camera, std::span<const Segment2> segm
     normal_z_.push_back(static_cast<float>(normal.z() / norm));
     length_.push_back(static_cast<float>(std::min(segment.Length(), kLengthCapPx)));
   }
-  best_.resize(length_.size());
+  while (length_.size() % kLanes != 0) {  // padding counts for nothing
+    for (std::vector<float>* column : {&normal_x_, &normal_y_, &normal_z_, &length_}) {
+      column->push_back(0.0f);
+    }
+  }
 
   const float sigma = static_cast<float>(options.rotation_sigma_rad / std::sqrt(3.0));
   draws_.clear();

@@ -30,7 +30,8 @@ struct RotationSearchOptions {
 /// infinity. Source: docs/method/association.md. Owns its work space; not thread-safe.
 class RotationSearch {
  public:
-  /// @param clusters   In the camera frame of the prior, like `out_rotations` (cam_from_prior).
+  /// @param clusters   At most 16 count. In the camera frame of the prior, like `out_rotations`
+  /// (cam_from_prior).
   /// @param out_rotations  Best first; the identity is one of the draws.
   void Search(const Camera& camera, std::span<const Segment2> segments,
               std::span<const DirectionCluster> clusters, const RotationSearchOptions& options,
@@ -43,12 +44,12 @@ class RotationSearch {
   };
   float Score(const Eigen::Matrix3f& rotation, std::span<const DirectionCluster> clusters);
 
-  std::vector<float> normal_x_, normal_y_, normal_z_, length_, best_;
+  std::vector<float> normal_x_, normal_y_, normal_z_, length_;
   std::vector<Draw> draws_;
   std::vector<uint32_t> order_;
 };
 
-/// Rotation by |w| about w, in single precision.
+/// Rotation by 2 atan(|w| / 2), which is nearly |w|, about w.
 Eigen::Matrix3f RotationFromVector(const Eigen::Vector3f& w);
 
 }  // namespace plumb

@@ -17,7 +17,11 @@ constexpr AlignmentStep kJoint[] = {{5.0, 0.09, 2.0}, {3.0, 0.06, 2.0}, {2.0, 0.
 
 constexpr double kMinVisiblePx = 10.0;
 constexpr double kPixelSigma = 0.7;
-constexpr double kOverlapCapPx = 120.0, kOverlapUnitPx = 30.0;
+constexpr float kOverlapCapPx = 120.0f, kOverlapUnitPx = 30.0f;
+// How far the image may move before pairs are listed anew, and the depth at which a translation
+// moves it so far.
+constexpr double kSlackPx = 3.0, kUsualDepthM = 1.0;
+constexpr double kConvergedStep = 1e-7;
 constexpr size_t kMinPairs = 4;
 constexpr double kMaxRotationStep = 0.1;
 constexpr double kMinResidualScale = 0.02;
@@ -45,64 +49,104 @@ void FrameSegments::Assign(std::span<const Segment2> all, size_t max_segments) {
   table.Assign(segments);
 }
 
-void FineAligner::Observe(std::span<const CandidateLine> lines, const FrameSegments& segments,
-                          double sigma_px) {
-  const double sigma = std::max(kPixelSigma, 0.5 * sigma_px);
-  observations_.clear();
-  for (const LinePair& pair : pairs_) {
-    const Segment2& segment = segments.segments[pair.segment];
-    const Eigen::Vector2d delta = segment.Delta();
-    const CandidateLine& line = lines[pair.line];
-    observations_.push_back(
-        {.line_in_world = line.segment_in_world,
-         .part_px = {segment.start + static_cast<double>(pair.begin) * delta,
-                     segment.start + static_cast<double>(pair.end) * delta},
-         .weight = pair.weight * line.weight * std::min<double>(pair.overlap_px, kOverlapCapPx) /
-                   kOverlapUnitPx,
-         .variance_px2 = sigma * sigma + map_variance_[pair.line]});
+void FineAligner::Begin(const Camera& camera, const Rigid3& reference,
+                        std::span<const CandidateLine> lines, const FrameSegments& segments) {
+  camera_ = camera;
+  segments_ = &segments;
+  lines_.Assign(lines, reference);
+  map_variance_.clear();
+  for (const CandidateLine& line : lines) {
+    map_variance_.push_back(static_cast<float>(MapVariancePx(camera, reference, line)));
+  }
+  listed_sigma_px_ = 0.0;
+}
+
+void FineAligner::ListPairs(const AlignmentStep& step) {
+  // A pair that is inside the gate now was inside the wider one when the list was made, unless the
+  // image has moved by more than the difference.
+  const double room_px = kSlackPx + 3.0 * (listed_sigma_px_ - step.sigma_px);
+  if (listed_sigma_px_ >= step.sigma_px && moved_px_ <= room_px) return;
+  list_.Build(projected_, segments_->table,
+              {.sigma_px = step.sigma_px, .sigma_sine = step.sigma_sine}, kSlackPx);
+  listed_sigma_px_ = step.sigma_px;
+  moved_px_ = 0.0;
+}
+
+void FineAligner::Observe(double sigma_px) {
+  const PairList::Pairs& pairs = list_.pairs();
+  const auto sigma = static_cast<float>(std::max(kPixelSigma, 0.5 * sigma_px));
+  observations_.Resize(pairs.size());
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    const auto line = static_cast<size_t>(pairs.line[p]);
+    observations_.line[p] = pairs.line[p];
+    observations_.x0[p] = pairs.x0[p];
+    observations_.y0[p] = pairs.y0[p];
+    observations_.x1[p] = pairs.x1[p];
+    observations_.y1[p] = pairs.y1[p];
+    observations_.weight[p] = pairs.weight[p] * lines_.weight[line] *
+                              std::min(pairs.overlap[p], kOverlapCapPx) / kOverlapUnitPx;
+    observations_.variance_px2[p] = sigma * sigma + map_variance_[line];
   }
 }
 
-FineAlignment FineAligner::Align(const Camera& camera, const Rigid3& start,
-                                 std::span<const CandidateLine> lines,
-                                 const FrameSegments& segments,
-                                 std::span<const AlignmentStep> schedule,
-                                 const PosePriorFactor& prior,
-                                 std::span<const PointObservation> points) {
+LineEnds FineAligner::Ends() const {
+  return {projected_.start_x.data(), projected_.start_y.data(), projected_.start_z.data(),
+          projected_.end_x.data(),   projected_.end_y.data(),   projected_.end_z.data()};
+}
+
+FineAlignment FineAligner::Run(const Rigid3& start, std::span<const AlignmentStep> schedule,
+                               const PosePriorFactor& prior, const PointTable* points) {
   FineAlignment out;
   out.cam_from_world = start;
-  map_variance_.clear();
-  for (const CandidateLine& line : lines) {
-    map_variance_.push_back(MapVariancePx(camera, start, line));
-  }
   for (const AlignmentStep& step : schedule) {
-    ProjectCandidates(camera, out.cam_from_world, lines, kMinVisiblePx, &projected_);
-    associator_.Associate(projected_, segments.table,
-                          {.sigma_px = step.sigma_px, .sigma_sine = step.sigma_sine}, &pairs_);
-    out.num_pairs = pairs_.size();
-    Observe(lines, segments, step.sigma_px);
-    if (pairs_.size() < kMinPairs && points.empty()) continue;
+    ProjectTable(camera_, out.cam_from_world, lines_, kMinVisiblePx, &projected_);
+    ListPairs(step);
+    list_.Weigh(projected_, {.sigma_px = step.sigma_px, .sigma_sine = step.sigma_sine});
+    out.num_pairs = list_.pairs().size();
+    if (out.num_pairs < kMinPairs && points == nullptr) continue;
+    Observe(step.sigma_px);
     const LineEquations line_terms =
-        AccumulateLines(camera, out.cam_from_world, observations_, step.robust);
+        line_terms_.Accumulate(camera_, Ends(), observations_, step.robust, LineLoss::kEachEnd);
     out.line_information = line_terms.equations.information;
     out.residual_scale = line_terms.residual_scale;
     NormalEquations equations = PriorEquations(prior, out.cam_from_world);
-    if (points.empty()) {
+    if (points == nullptr) {
       equations.Add(line_terms.equations);
     } else {
       equations.Add(line_terms.equations,
                     1.0 / std::max(line_terms.residual_scale, kMinResidualScale));
-      const auto point_terms = points_.Accumulate(camera, out.cam_from_world, points);
-      equations.Add(point_terms.equations);
-      out.point_information = point_terms.equations.information;
-      out.num_points = point_terms.num_points;
-      out.point_scale = point_terms.scale;
+      const auto terms = point_terms_.Accumulate(camera_, out.cam_from_world, *points);
+      equations.Add(terms.equations);
+      out.point_information = terms.equations.information;
+      out.num_points = terms.num_points;
+      out.point_scale = terms.scale;
     }
     const auto delta = SolveStep(equations, kMaxRotationStep);
     if (!delta) break;
     out.cam_from_world = Perturb(out.cam_from_world, *delta);
+    moved_px_ +=
+        camera_.MeanFocal() * (delta->head<3>().norm() + delta->tail<3>().norm() / kUsualDepthM);
   }
   return out;
+}
+
+Rigid3 FineAligner::Polish(const FineAlignment& alignment, double robust, int max_steps,
+                           const PosePriorFactor& prior, const PointTable& points) {
+  Rigid3 pose = alignment.cam_from_world;
+  for (int step = 0; step < max_steps; ++step) {
+    ProjectTable(camera_, pose, lines_, kMinVisiblePx, &projected_);
+    NormalEquations equations = PriorEquations(prior, pose);
+    equations.Add(
+        line_terms_.Accumulate(camera_, Ends(), observations_, robust, LineLoss::kBothEnds)
+            .equations,
+        1.0 / std::max(alignment.residual_scale, kMinResidualScale));
+    equations.Add(point_terms_.Accumulate(camera_, pose, points, alignment.point_scale).equations);
+    const auto delta = SolveStep(equations, kMaxRotationStep);
+    if (!delta) break;
+    pose = Perturb(pose, *delta);
+    if (delta->norm() < kConvergedStep) break;
+  }
+  return pose;
 }
 
 }  // namespace plumb

@@ -9,9 +9,12 @@
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
 #include "plumb/matching/candidate_line.h"
+#include "plumb/matching/candidate_table.h"
+#include "plumb/matching/pair_list.h"
 #include "plumb/matching/segment_table.h"
-#include "plumb/matching/soft_association.h"
+#include "plumb/refine/line_terms.h"
 #include "plumb/refine/normal_equations.h"
+#include "plumb/refine/point_terms.h"
 
 namespace plumb {
 
@@ -45,35 +48,49 @@ struct FineAlignment {
   double residual_scale = 1.0;                    // of the lines (LineEquations)
   size_t num_pairs = 0;                           // of the last step
   int num_points = 0;
-  double point_scale = 1.0;  // of the points' whitened squares (PointAccumulator)
+  double point_scale = 1.0;  // of the points' whitened squares (PointTableAccumulator)
 };
 
 /// Owns its work space and does not allocate once warm; not thread-safe.
 class FineAligner {
  public:
-  /// Each step associates `lines` with the segments and solves once, with `prior` as a factor.
+  /// Chooses what the next runs align.
+  /// @param reference  A pose near those to come; the lines' own variances are taken there.
+  /// @param segments   Borrowed until the next Begin().
+  void Begin(const Camera& camera, const Rigid3& reference, std::span<const CandidateLine> lines,
+             const FrameSegments& segments);
+
+  /// Each step associates the lines with the segments and solves once, with `prior` as a factor.
   /// Observations are weighted with pair weight x line weight x overlap (at most 120 px) / 30 px;
   /// their variance is max(0.7, sigma / 2)^2 px^2 plus the line's own. With `points`, the lines'
   /// information is divided by their residual scale, so that each family counts by its own
-  /// residuals.
-  FineAlignment Align(const Camera& camera, const Rigid3& start,
-                      std::span<const CandidateLine> lines, const FrameSegments& segments,
-                      std::span<const AlignmentStep> schedule, const PosePriorFactor& prior,
-                      std::span<const PointObservation> points = {});
+  /// residuals. Pairs are listed anew only when the pose has moved so far that the list may lack
+  /// one.
+  FineAlignment Run(const Rigid3& start, std::span<const AlignmentStep> schedule,
+                    const PosePriorFactor& prior, const PointTable* points = nullptr);
 
-  /// The observations of the last step, for a solver that polishes the pose.
-  std::span<const LineObservation> observations() const { return observations_; }
+  /// Gauss-Newton on the last associations of a run with points, one Geman-McClure weight an
+  /// observation and the scales as they are, at most `max_steps`, until the step is below 1e-7.
+  /// @return the pose.
+  Rigid3 Polish(const FineAlignment& alignment, double robust, int max_steps,
+                const PosePriorFactor& prior, const PointTable& points);
 
  private:
-  void Observe(std::span<const CandidateLine> lines, const FrameSegments& segments,
-               double sigma_px);
+  void ListPairs(const AlignmentStep& step);
+  void Observe(double sigma_px);
+  LineEnds Ends() const;
 
+  Camera camera_;
+  const FrameSegments* segments_ = nullptr;
+  CandidateTable lines_;
+  std::vector<float> map_variance_;
   ProjectedLines projected_;
-  SoftAssociator associator_;
-  std::vector<LinePair> pairs_;
-  std::vector<double> map_variance_;
-  std::vector<LineObservation> observations_;
-  PointAccumulator points_;
+  PairList list_;
+  double listed_sigma_px_ = 0.0;  // gate of the list; 0: there is none
+  double moved_px_ = 0.0;         // since it was made, at most
+  LineObservationTable observations_;
+  LineAccumulator line_terms_;
+  PointTableAccumulator point_terms_;
 };
 
 }  // namespace plumb

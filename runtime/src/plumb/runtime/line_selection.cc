@@ -1,6 +1,7 @@
 #include "plumb/runtime/line_selection.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "plumb/geometry/line_projection.h"
@@ -23,13 +24,14 @@ const VisibilityOptions kVisibility;
 // Deviations of a lifted end point: along its ray from depth, across it from the segment's pixels.
 constexpr double kDepthQuadratic = 0.004, kDepthConstantM = 0.003, kPixelSigma = 0.7;
 
-Eigen::Matrix3d LiftedCovariance(const KeyFrame& key_frame, const Eigen::Vector3d& x_in_world) {
-  const Eigen::Vector3d x = key_frame.cam_from_world * x_in_world;
-  const double across = kPixelSigma * x.z() / key_frame.camera.MeanFocal();
-  const double along = kDepthQuadratic * x.z() * x.z() + kDepthConstantM;
-  const Eigen::Vector3d ray = key_frame.cam_from_world.rotation.conjugate() * x.normalized();
+Eigen::Matrix3d LiftedCovariance(const KeyFrame& key_frame, const Eigen::Vector3d& axis,
+                                 const Eigen::Vector3d& center, const Eigen::Vector3d& x_in_world) {
+  const Eigen::Vector3d ray = x_in_world - center;
+  const double depth = axis.dot(ray);
+  const double across = kPixelSigma * depth / key_frame.camera.MeanFocal();
+  const double along = kDepthQuadratic * depth * depth + kDepthConstantM;
   return across * across * Eigen::Matrix3d::Identity() +
-         (along * along - across * across) * ray * ray.transpose();
+         (along * along - across * across) / ray.squaredNorm() * ray * ray.transpose();
 }
 
 // Seen from about the same side and distance as in the key frame that lifted it.
@@ -53,23 +55,24 @@ double LineWeight(const MapLine& line) {
 
 void LineSelector::KeepBest(size_t max_lines) {
   const size_t kept = std::min(max_lines, ranked_.size());
-  std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<ptrdiff_t>(kept), ranked_.end(),
-                    [](const Ranked& a, const Ranked& b) {
-                      return a.value != b.value ? a.value > b.value : a.id < b.id;
-                    });
-  ranked_.resize(kept);
+  const auto is_better = [](const Ranked& a, const Ranked& b) {
+    return a.value != b.value ? a.value > b.value : a.id < b.id;
+  };
+  if (kept < ranked_.size()) {
+    std::nth_element(ranked_.begin(), ranked_.begin() + static_cast<ptrdiff_t>(kept), ranked_.end(),
+                     is_better);
+    ranked_.resize(kept);
+  }
+  std::sort(ranked_.begin(), ranked_.end(), is_better);
 }
 
-void LineSelector::AppendFused(const Camera& camera, const Rigid3& cam_from_world,
-                               std::span<const uint32_t> lines, double margin_px, size_t max_lines,
-                               std::vector<CandidateLine>* out) {
+void LineSelector::AppendFused(size_t max_lines, std::vector<CandidateLine>* out) {
   const LineMap& map = index_.map();
   ranked_.clear();
-  for (const uint32_t id : lines) {
-    const auto image =
-        ProjectSegment(camera, cam_from_world, map.lines[id].segment_in_world, margin_px);
-    const double length = image ? image->Length() : 0.0;
-    ranked_.push_back({std::min(length, kLengthCapPx) * LineWeight(map.lines[id]), id});
+  for (const VisibleLine& visible : visible_) {
+    const double length = static_cast<double>(visible.length_px);
+    ranked_.push_back(
+        {std::min(length, kLengthCapPx) * LineWeight(map.lines[visible.line]), visible.line});
   }
   KeepBest(max_lines);
   out->clear();
@@ -89,7 +92,7 @@ void LineSelector::SelectForSearch(const Camera& camera, const Rigid3& cam_from_
   options.margin_px = kSearchMarginPx + kSearchMarginPxPerRad * rotation_sigma_rad;
   options.min_length_px = kMinLengthPx;
   index_.VisibleLines(camera, cam_from_world, options, &visible_);
-  AppendFused(camera, cam_from_world, visible_, options.margin_px, kMaxSearchLines, out);
+  AppendFused(kMaxSearchLines, out);
 }
 
 void LineSelector::SelectForAlignment(const Camera& camera, const Rigid3& cam_from_world,
@@ -102,7 +105,7 @@ void LineSelector::SelectForAlignment(const Camera& camera, const Rigid3& cam_fr
     options.nearest_key_frames = 0;
     index_.VisibleLines(camera, cam_from_world, options, &visible_);
   }
-  AppendFused(camera, cam_from_world, visible_, kRankMarginPx, kMaxAlignmentLines, out);
+  AppendFused(kMaxAlignmentLines, out);
 }
 
 void LineSelector::SelectLocal(const Camera& camera, const Rigid3& cam_from_world,
@@ -110,6 +113,7 @@ void LineSelector::SelectLocal(const Camera& camera, const Rigid3& cam_from_worl
   const LineMap& map = index_.map();
   index_.NearestKeyFrames(cam_from_world, kLocalKeyFrames, &key_frames_);
   const Eigen::Vector3d center = cam_from_world.Center();
+  const Eigen::Matrix3d rotation = cam_from_world.RotationMatrix();
   ranked_.clear();
   uint32_t id = 0;
   for (const uint32_t k : key_frames_) {
@@ -119,13 +123,22 @@ void LineSelector::SelectLocal(const Camera& camera, const Rigid3& cam_from_worl
       const uint32_t this_id = id++;
       const Segment3& segment = lifted.segment_in_world;
       if (!IsSeenAlike(segment.Midpoint(), key_frame_center, center)) continue;
-      const auto image = ProjectSegment(camera, cam_from_world, segment, kRankMarginPx);
+      const auto image = ProjectSegmentInCam(camera,
+                                             {rotation * segment.start + cam_from_world.translation,
+                                              rotation * segment.end + cam_from_world.translation},
+                                             kRankMarginPx);
       const double length = image ? image->Length() : 0.0;
       if (!(length > kMinLengthPx)) continue;
       ranked_.push_back({std::min(length, kLengthCapPx), this_id});
     }
   }
   KeepBest(kMaxLocalLines);
+  std::array<Eigen::Vector3d, kLocalKeyFrames> centers, axes;
+  for (size_t k = 0; k < key_frames_.size(); ++k) {
+    const Rigid3& pose = map.key_frames[key_frames_[k]].cam_from_world;
+    centers[k] = pose.Center();
+    axes[k] = pose.RotationMatrix().row(2);
+  }
   out->clear();
   for (const Ranked& entry : ranked_) {
     uint32_t offset = entry.id;
@@ -135,11 +148,13 @@ void LineSelector::SelectLocal(const Camera& camera, const Rigid3& cam_from_worl
     }
     const KeyFrame& key_frame = map.key_frames[key_frames_[k]];
     const Segment3& segment = key_frame.segments[offset].segment_in_world;
-    out->push_back({.segment_in_world = segment,
-                    .weight = 1.0,
-                    .covariance_start = LiftedCovariance(key_frame, segment.start),
-                    .covariance_end = LiftedCovariance(key_frame, segment.end),
-                    .id = entry.id});
+    const Eigen::Vector3d& seen_from = centers[k];
+    out->push_back(
+        {.segment_in_world = segment,
+         .weight = 1.0,
+         .covariance_start = LiftedCovariance(key_frame, axes[k], seen_from, segment.start),
+         .covariance_end = LiftedCovariance(key_frame, axes[k], seen_from, segment.end),
+         .id = entry.id});
   }
 }
 

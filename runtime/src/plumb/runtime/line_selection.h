@@ -43,13 +43,12 @@ class LineSelector {
     double value;
     uint32_t id;
   };
-  void AppendFused(const Camera& camera, const Rigid3& cam_from_world,
-                   std::span<const uint32_t> lines, double margin_px, size_t max_lines,
-                   std::vector<CandidateLine>* out);
+  void AppendFused(size_t max_lines, std::vector<CandidateLine>* out);
   void KeepBest(size_t max_lines);
 
   const MapIndex& index_;
-  std::vector<uint32_t> visible_, key_frames_;
+  std::vector<VisibleLine> visible_;
+  std::vector<uint32_t> key_frames_;
   std::vector<Ranked> ranked_;
 };
 

@@ -37,6 +37,10 @@ Status PoseRefinerOptions::Validate() const {
     return Error{ErrorCode::kInvalidArgument,
                  "min_map_support " + std::to_string(min_map_support) + " is not in (0, 1)"};
   }
+  if (time_budget_ns < 0) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "time_budget_ns " + std::to_string(time_budget_ns) + " is negative"};
+  }
   return Ok();
 }
 

@@ -55,6 +55,10 @@ struct PoseRefinerOptions {
   double min_map_support = 0.05;
   /// Seed of the search's random draws; the frame's `seed` is mixed in.
   uint64_t seed = 0;
+  /// Time that a frame may take, about; 0: as long as it takes, and reproducible. When it runs out,
+  /// hypotheses, alignment levels, further starts, the second attempt and the last steps are left
+  /// out, in this order as they come; the acceptance gate never is. >= 0.
+  int64_t time_budget_ns = 0;
 
   Status Validate() const;
 };
@@ -76,6 +80,23 @@ struct LineMatch {
   double distance_px = 0.0;  // rms perpendicular distance of the overlap's ends
 };
 
+/// Where the time of the default method went [ns]; a second attempt is added to the first.
+struct RefineStages {
+  int64_t index_ns = 0;       // queries of the map's index and the lists made of them
+  int64_t field_ns = 0;       // distance fields of the search
+  int64_t score_ns = 0;       // drawing and scoring hypotheses
+  int64_t coarse_ns = 0;      // aligning them on the field
+  int64_t fine_ns = 0;        // soft association on the fused lines
+  int64_t support_ns = 0;     // what the acceptance gate compares
+  int64_t local_ns = 0;       // last step on the key frames' own lines
+  int64_t points_ns = 0;      // pose of the points alone
+  int64_t joint_ns = 0;       // lines and points together
+  int64_t covariance_ns = 0;  // and observability
+  int64_t report_ns = 0;      // matches at the final pose
+  uint32_t num_hypotheses = 0;
+  bool out_of_time = false;  // something was left out for the time budget
+};
+
 struct RefineResult {
   RefineStatus status = RefineStatus::kLowSupport;
   Rigid3 cam_from_world;  // the prior unless kRefined
@@ -93,6 +114,7 @@ struct RefineResult {
   uint32_t num_points_used = 0;
   // Time of the stages [ns].
   int64_t search_ns = 0, match_and_refine_ns = 0, total_ns = 0;
+  RefineStages stages;
 };
 
 /// Refines poses against one map. Not thread-safe; use one per thread. After the first few frames

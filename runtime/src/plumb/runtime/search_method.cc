@@ -1,10 +1,9 @@
 #include "plumb/runtime/search_method.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
-#include "plumb/refine/joint_solver.h"
+#include "plumb/base/stopwatch.h"
 #include "plumb/refine/uncertainty.h"
 
 namespace plumb {
@@ -29,25 +28,25 @@ constexpr uint32_t kMaxHypotheses = 2048;
 
 constexpr size_t kMinLocalLines = 20;
 
+// Selected lines serve all poses that are so near: the image moves by less than its margin.
+constexpr double kReusePositionM = 0.05, kReuseRotationRad = 0.035;
+
+// Shares of the time budget after which no further start, attempt or last step begins.
+constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.9;
+
 // Points that take part in the joint solution lie this near to the lines' pose.
 constexpr size_t kMinPoints = 6;
 // A pose from points alone is a start for the lines, and with many points an answer.
 constexpr size_t kMinSolvingPoints = 12, kMinDecidingPoints = 40;
 
 // The joint solution's last word.
-constexpr double kLineRobust = 1.0, kPointRobust = 3.0;  // as in the steps before
+constexpr double kLineRobust = 1.0;  // as in the steps before
 constexpr int kPolishSteps = 5;
 
 constexpr double kMinScale = 0.02;  // of residuals: perfect input must not divide by zero
 
 // Of the pairs that are reported as matches.
 constexpr AssociationGates kMatchGates{.sigma_px = 2.0, .sigma_sine = 0.05};
-
-int64_t NowNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 bool IsSame(const Rigid3& a_from_world, const Rigid3& b_from_world) {
   const PoseDistance distance = DistanceBetween(a_from_world, b_from_world);
@@ -72,14 +71,19 @@ SearchMethod::SearchMethod(const MapIndex& index, const PoseRefinerOptions& opti
     : index_(index), options_(options), selector_(index) {}
 
 void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
-  const int64_t start_ns = NowNs();
+  Stopwatch whole, watch;
+  stages_ = {};
+  deadline_ = Deadline(options_.time_budget_ns);
+  fine_lines_pose_.reset();
   segments_.Assign(input.segments, kMaxSegments);
+  watch.Lap();
   AcceptPoints(input);
+  stages_.points_ns = watch.Lap();
   PosePrior prior = input.prior;
   const uint32_t num_tried = CountDistinctPoses(prior, input.search ? options_.num_hypotheses : 1);
   Attempt attempt = Try(input, prior, options_.num_hypotheses, num_tried);
   int64_t search_ns = attempt.search_ns;
-  if (input.search && MayWiden(attempt, prior.cam_from_world)) {
+  if (input.search && MayWiden(attempt, prior.cam_from_world) && !IsOutOfTime(kWideningShare)) {
     PosePrior wide = prior;
     wide.position_sigma_m *= kWideningFactor;
     wide.rotation_sigma_rad *= kWideningFactor;
@@ -104,15 +108,22 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
     attempt.alignment.cam_from_world = point_pose_.cam_from_world;
   }
   if (result->status == RefineStatus::kRefined) Finish(input, prior, attempt.alignment, result);
+  watch.Lap();
   ReportMatches(input.camera, result->cam_from_world, result);
+  stages_.report_ns = watch.Lap();
   result->search_ns = search_ns;
-  result->match_and_refine_ns = NowNs() - start_ns - search_ns;
+  result->match_and_refine_ns = whole.Lap() - search_ns;
+  result->stages = stages_;
 }
 
 void SearchMethod::Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
                           RefineResult* result) {
-  FinishOnLocalLines(input, WeakFactor(prior), &alignment);
-  FinishWithPoints(input, WeakFactor(prior), &alignment);
+  Stopwatch watch;
+  local_lines_.clear();
+  if (!IsOutOfTime(kLastStepsShare)) FinishOnLocalLines(input, WeakFactor(prior), &alignment);
+  stages_.local_ns = watch.Lap();
+  if (!IsOutOfTime()) FinishWithPoints(input, WeakFactor(prior), &alignment);
+  stages_.joint_ns = watch.Lap();
   // Both families in units of the lines' own residuals, which the covariance divides out again.
   const Matrix6d information =
       alignment.line_information + alignment.residual_scale * alignment.point_information;
@@ -126,13 +137,15 @@ void SearchMethod::Finish(const RefineInput& input, const PosePrior& prior, Fine
               prior_information)
           .num_observed;
   result->num_points_used = static_cast<uint32_t>(alignment.num_points);
+  stages_.covariance_ns = watch.Lap();
 }
 
 void SearchMethod::AcceptPoints(const RefineInput& input) {
-  all_points_.clear();
+  observed_points_.clear();
   for (const PointMatch& match : input.points) {
-    all_points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
+    observed_points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
   }
+  all_points_.Assign(observed_points_, input.prior.cam_from_world);
   point_pose_ = {};
   if (all_points_.size() >= kMinSolvingPoints) {
     point_pose_ = point_solver_.Solve(input.camera, WeakFactor(input.prior), all_points_);
@@ -163,32 +176,41 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
                                         uint32_t num_hypotheses, uint32_t num_tried) {
   Attempt attempt;
   attempt.alignment.cam_from_world = prior.cam_from_world;
+  Stopwatch watch;
   selector_.SelectForSearch(input.camera, prior.cam_from_world, prior.rotation_sigma_rad,
                             &search_lines_);
+  search_table_.Assign(search_lines_, prior.cam_from_world);
+  stages_.index_ns += watch.Lap();
   if (search_lines_.size() < kMinLines || segments_.segments.size() < kMinSegments) return attempt;
 
-  const int64_t start_ns = NowNs();
   const std::span<const FoundPose> starts = FindStarts(input, prior, num_hypotheses);
-  attempt.search_ns = NowNs() - start_ns;
+  attempt.search_ns = watch.Lap();
   const auto schedule = input.search ? FineSchedule() : StreamSchedule();
   survivors_.clear();
   const auto align_from = [&](const Rigid3& start) {
-    selector_.SelectForAlignment(input.camera, start, &fine_lines_);
+    watch.Lap();
+    SelectFineLines(input.camera, start);
+    stages_.index_ns += watch.Lap();
     if (fine_lines_.size() < kMinLines) return;
+    aligner_.Begin(input.camera, start, fine_lines_, segments_);
     // Half way it shows whether a start leads to an answer that is already there.
-    const auto align = [&](const Rigid3& from, std::span<const AlignmentStep> steps) {
-      return aligner_.Align(input.camera, from, fine_lines_, segments_, steps, WeakFactor(prior));
-    };
     const size_t half = schedule.size() / 2;
-    const Rigid3 half_way = align(start, schedule.first(half)).cam_from_world;
+    const Rigid3 half_way =
+        aligner_.Run(start, schedule.first(half), WeakFactor(prior)).cam_from_world;
+    stages_.fine_ns += watch.Lap();
     for (const Survivor& other : survivors_) {
       if (IsSame(half_way, other.alignment.cam_from_world)) return;
     }
     Survivor& survivor = survivors_.emplace_back();
-    survivor.alignment = align(half_way, schedule.subspan(half));
+    survivor.alignment = aligner_.Run(half_way, schedule.subspan(half), WeakFactor(prior));
+    stages_.fine_ns += watch.Lap();
     survivor.support = MeasureSupport(input.camera, survivor.alignment.cam_from_world);
+    stages_.support_ns += watch.Lap();
   };
-  for (const FoundPose& start : starts) align_from(start.cam_from_world);
+  for (const FoundPose& start : starts) {
+    if (!survivors_.empty() && IsOutOfTime(kStartsShare)) break;
+    align_from(start.cam_from_world);
+  }
   if (point_pose_.num_inliers >= kMinSolvingPoints) align_from(point_pose_.cam_from_world);
   if (survivors_.empty()) return attempt;
   const Survivor& best = *std::max_element(
@@ -202,6 +224,7 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
   }
   const double value = best.support.Value();
   attempt.alignment = best.alignment;
+  watch.Lap();
   attempt.evidence = {
       .refined = best.support,
       .prior = MeasureSupport(input.camera, prior.cam_from_world),
@@ -214,6 +237,7 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
                                              .min_evidence_nats = EvidenceToBeat(num_tried),
                                              .min_gain = input.search ? kSearchGain : kStreamGain,
                                              .needs_all_directions = input.search});
+  stages_.support_ns += watch.Lap();
   return attempt;
 }
 
@@ -228,15 +252,36 @@ std::span<const FoundPose> SearchMethod::FindStarts(const RefineInput& input,
   for (const CandidateLine& line : search_lines_) {
     lines_to_find_.push_back({line.segment_in_world, line.weight});
   }
-  return pose_search_.Search(
+  const std::span<const FoundPose> found = pose_search_.Search(
       input.camera, {prior.cam_from_world, prior.rotation_sigma_rad, prior.position_sigma_m},
       lines_to_find_, segments_.segments,
-      {.num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors},
+      {.num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors, .deadline = deadline_},
       MixSeeds(options_.seed, input.seed));
+  const PoseSearchTimes& times = pose_search_.times();
+  stages_.field_ns += times.field_ns;
+  stages_.score_ns += times.draw_ns + times.score_ns;
+  stages_.coarse_ns += times.align_ns;
+  stages_.num_hypotheses += num_hypotheses;
+  return found;
+}
+
+bool SearchMethod::IsOutOfTime(double share) {
+  if (!deadline_.HasPassed(share)) return false;
+  stages_.out_of_time = true;
+  return true;
+}
+
+void SearchMethod::SelectFineLines(const Camera& camera, const Rigid3& cam_from_world) {
+  if (fine_lines_pose_) {
+    const PoseDistance distance = DistanceBetween(cam_from_world, *fine_lines_pose_);
+    if (distance.position_m < kReusePositionM && distance.rotation_rad < kReuseRotationRad) return;
+  }
+  selector_.SelectForAlignment(camera, cam_from_world, &fine_lines_);
+  fine_lines_pose_ = cam_from_world;
 }
 
 PoseSupport SearchMethod::MeasureSupport(const Camera& camera, const Rigid3& cam_from_world) {
-  ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
+  ProjectTable(camera, cam_from_world, search_table_, kMinVisiblePx, &projected_);
   return support_meter_.Measure(projected_, segments_.table);
 }
 
@@ -249,50 +294,32 @@ void SearchMethod::FinishOnLocalLines(const RefineInput& input, const PosePriorF
                                       FineAlignment* alignment) {
   selector_.SelectLocal(input.camera, alignment->cam_from_world, &local_lines_);
   if (local_lines_.size() < kMinLocalLines) {
-    selector_.SelectForAlignment(input.camera, alignment->cam_from_world, &fine_lines_);
+    SelectFineLines(input.camera, alignment->cam_from_world);
     return;
   }
-  *alignment = aligner_.Align(input.camera, alignment->cam_from_world, local_lines_, segments_,
-                              LocalSchedule(), prior);
+  aligner_.Begin(input.camera, alignment->cam_from_world, local_lines_, segments_);
+  *alignment = aligner_.Run(alignment->cam_from_world, LocalSchedule(), prior);
 }
 
 void SearchMethod::FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
                                     FineAlignment* alignment) {
-  near_points_.clear();
-  for (const PointObservation& point : all_points_) {
-    if (ReprojectsNear(input.camera, alignment->cam_from_world, point)) {
-      near_points_.push_back(point);
-    }
+  point_terms_.FindNear(input.camera, alignment->cam_from_world, all_points_, kNearPointPx,
+                        &near_rows_);
+  if (near_rows_.size() < kMinPoints) return;
+  near_points_.AssignRows(all_points_, near_rows_);
+  // The aligner still holds the local lines, if there were enough.
+  if (local_lines_.size() < kMinLocalLines) {
+    SelectFineLines(input.camera, alignment->cam_from_world);
+    aligner_.Begin(input.camera, alignment->cam_from_world, fine_lines_, segments_);
   }
-  if (near_points_.size() < kMinPoints) return;
-  const std::vector<CandidateLine>& lines =
-      local_lines_.size() < kMinLocalLines ? fine_lines_ : local_lines_;
-  *alignment = aligner_.Align(input.camera, alignment->cam_from_world, lines, segments_,
-                              JointSchedule(), prior, near_points_);
-  Polish(input.camera, prior, alignment);
-}
-
-void SearchMethod::Polish(const Camera& camera, const PosePriorFactor& prior,
-                          FineAlignment* alignment) {
-  // The cost measures points in their whitened units; lines and prior follow in the same.
-  const double line_factor =
-      alignment->point_scale / std::max(alignment->residual_scale, kMinScale);
-  line_observations_.assign(aligner_.observations().begin(), aligner_.observations().end());
-  for (LineObservation& line : line_observations_) line.weight *= line_factor;
-  PosePriorFactor scaled_prior = prior;
-  scaled_prior.rotation_sigma_rad /= std::sqrt(alignment->point_scale);
-  scaled_prior.position_sigma_m /= std::sqrt(alignment->point_scale);
-  const auto solution = SolveOverlapCost(
-      camera, alignment->cam_from_world, line_observations_, near_points_, &scaled_prior,
-      {.line_robust = kLineRobust,
-       .point_robust = kPointRobust * std::sqrt(alignment->point_scale),
-       .max_iterations = kPolishSteps});
-  if (solution) alignment->cam_from_world = solution->cam_from_world;
+  *alignment = aligner_.Run(alignment->cam_from_world, JointSchedule(), prior, &near_points_);
+  alignment->cam_from_world =
+      aligner_.Polish(*alignment, kLineRobust, kPolishSteps, prior, near_points_);
 }
 
 void SearchMethod::ReportMatches(const Camera& camera, const Rigid3& cam_from_world,
                                  RefineResult* result) {
-  selector_.SelectForAlignment(camera, cam_from_world, &fine_lines_);
+  SelectFineLines(camera, cam_from_world);
   ProjectCandidates(camera, cam_from_world, fine_lines_, kMinVisiblePx, &projected_);
   associator_.Associate(projected_, segments_.table, kMatchGates, &pairs_);
   best_pair_.assign(segments_.segments.size(), -1);

@@ -3,11 +3,15 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "plumb/base/deadline.h"
 #include "plumb/map/map_index.h"
 #include "plumb/matching/candidate_line.h"
+#include "plumb/matching/candidate_table.h"
 #include "plumb/matching/match_evidence.h"
+#include "plumb/matching/soft_association.h"
 #include "plumb/matching/support.h"
 #include "plumb/runtime/acceptance_gate.h"
 #include "plumb/runtime/fine_alignment.h"
@@ -51,6 +55,10 @@ class SearchMethod {
   bool HoldsByPoints(const RefineInput& input) const;
   std::span<const FoundPose> FindStarts(const RefineInput& input, const PosePrior& prior,
                                         uint32_t num_hypotheses);
+  /// Keeps the lines of a pose that is near enough.
+  void SelectFineLines(const Camera& camera, const Rigid3& cam_from_world);
+  /// Whether work that starts now has to be left out.
+  bool IsOutOfTime(double share = 1.0);
   PoseSupport MeasureSupport(const Camera& camera, const Rigid3& cam_from_world);
   MatchEvidence MeasureEvidence(const Camera& camera, const Rigid3& cam_from_world);
   /// The last steps of a pose that was accepted, and its covariance.
@@ -60,8 +68,6 @@ class SearchMethod {
                           FineAlignment* alignment);
   void FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
                         FineAlignment* alignment);
-  /// Levenberg-Marquardt on the last associations, lines and points together, until it converges.
-  void Polish(const Camera& camera, const PosePriorFactor& prior, FineAlignment* alignment);
   void ReportMatches(const Camera& camera, const Rigid3& cam_from_world, RefineResult* result);
 
   const MapIndex& index_;
@@ -70,9 +76,11 @@ class SearchMethod {
   FrameSegments segments_;
   std::vector<CandidateLine> search_lines_;  // visible from the prior; all supports use them
   std::vector<CandidateLine> fine_lines_, local_lines_;
+  std::optional<Rigid3> fine_lines_pose_;  // for which fine_lines_ were selected in this frame
   std::vector<SearchLine> lines_to_find_;
   PoseSearch pose_search_;
   std::array<FoundPose, 1> only_prior_;
+  CandidateTable search_table_;  // of search_lines_
   FineAligner aligner_;
   SupportMeter support_meter_;
   EvidenceMeter evidence_meter_;
@@ -80,11 +88,15 @@ class SearchMethod {
   std::vector<Survivor> survivors_;
   PointSolver point_solver_;
   PointPose point_pose_;  // without inliers: none
-  std::vector<LineObservation> line_observations_;
-  std::vector<PointObservation> all_points_, near_points_;
+  std::vector<PointObservation> observed_points_;
+  PointTable all_points_, near_points_;
+  PointTableAccumulator point_terms_;
+  std::vector<uint32_t> near_rows_;
   SoftAssociator associator_;
   std::vector<LinePair> pairs_;
   std::vector<int32_t> best_pair_;  // per segment
+  RefineStages stages_;             // of this frame
+  Deadline deadline_;
 };
 
 }  // namespace plumb

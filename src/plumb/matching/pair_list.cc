@@ -1,0 +1,229 @@
+#include "plumb/matching/pair_list.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "plumb/base/simd_clones.h"
+
+namespace plumb {
+namespace {
+
+constexpr size_t kLanes = SegmentTable::kLanes;
+constexpr float kGateSigmas = 3.0f;
+constexpr float kOutlierMass = 0.1f;
+constexpr float kFragmentsPerLine = 1.5f;
+// Lines know their angle to 0.004 rad.
+constexpr float kAngleSlack = 0.005f;
+// What a list leaves to the pose that moves: of the sine, of the shares.
+constexpr float kSineSlack = 0.02f, kShareSlack = 0.1f;
+
+size_t Padded(size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
+
+struct Line {
+  float x, y, direction_x, direction_y, length;
+};
+
+/// Smallest distances first, then overlaps, then shares; all of them exclusive.
+struct Limits {
+  float square, sine, overlap, share;
+};
+
+Limits LimitsOf(const AssociationGates& gates, float slack_px) {
+  const float distance = kGateSigmas * static_cast<float>(gates.sigma_px) + slack_px;
+  const bool exact = slack_px <= 0.0f;
+  return {
+      distance * distance,
+      kGateSigmas * static_cast<float>(gates.sigma_sine) + (exact ? 0.0f : kSineSlack),
+      std::max(static_cast<float>(gates.min_overlap_px) - slack_px, 0.0f),
+      std::max(static_cast<float>(gates.min_overlap_share) - (exact ? 0.0f : kShareSlack), 0.0f)};
+}
+
+PLUMB_SIMD_CLONES void InsideKernel(const Line line, const Limits limits, size_t count,
+                                    const float* __restrict x0, const float* __restrict y0,
+                                    const float* __restrict x1, const float* __restrict y1,
+                                    const float* __restrict dx, const float* __restrict dy,
+                                    const float* __restrict length, int32_t* __restrict inside) {
+  for (size_t k = 0; k < count; ++k) {
+    const float ax = x0[k] - line.x, ay = y0[k] - line.y;
+    const float bx = x1[k] - line.x, by = y1[k] - line.y;
+    const float along_a = ax * line.direction_x + ay * line.direction_y;
+    const float along_b = bx * line.direction_x + by * line.direction_y;
+    const float across_a = ay * line.direction_x - ax * line.direction_y;
+    const float across_b = by * line.direction_x - bx * line.direction_y;
+    const float first = std::max(std::min(along_a, along_b), 0.0f);
+    const float last = std::min(std::max(along_a, along_b), line.length);
+    const float extent = along_b - along_a;
+    const float inverse = 1.0f / (std::abs(extent) < 1e-6f ? 1e-6f : extent);
+    const float slope = (across_b - across_a) * inverse;
+    const float h0 = across_a + (first - along_a) * slope;
+    const float h1 = across_a + (last - along_a) * slope;
+    const float sine = std::abs(line.direction_x * dy[k] - line.direction_y * dx[k]);
+    const float overlap = last - first;
+    inside[k] = (0.5f * (h0 * h0 + h1 * h1) < limits.square) & (sine < limits.sine) &
+                (overlap > limits.overlap) &
+                (overlap > limits.share * std::min(line.length, length[k]));
+  }
+}
+
+/// exp(x) for x in -80..0, relative error 2e-7.
+inline float Exp(float x) {
+  const float t = x * std::numbers::log2e_v<float>;
+  const auto whole = static_cast<int32_t>(t - 0.5f);
+  const float f = (t - static_cast<float>(whole)) * std::numbers::ln2_v<float>;
+  const float p =
+      1.0f + f * (1.0f + f * (0.5f + f * (1.0f / 6.0f +
+                                          f * (1.0f / 24.0f + f * (1.0f / 120.0f + f / 720.0f)))));
+  return p * std::bit_cast<float>((whole + 127) << 23);
+}
+
+PLUMB_SIMD_CLONES void WeighKernel(const Limits limits, float square_factor, float sine_factor,
+                                   size_t count, const int32_t* __restrict row,
+                                   const float* __restrict line_x, const float* __restrict line_y,
+                                   const float* __restrict line_dx, const float* __restrict line_dy,
+                                   const float* __restrict line_length, const float* __restrict x0,
+                                   const float* __restrict y0, const float* __restrict x1,
+                                   const float* __restrict y1, const float* __restrict dx,
+                                   const float* __restrict dy, const float* __restrict length,
+                                   float* __restrict e, float* __restrict out_overlap,
+                                   float* __restrict out_begin, float* __restrict out_end,
+                                   float* __restrict out_square) {
+  for (size_t k = 0; k < count; ++k) {
+    const int32_t i = row[k];
+    const float lx = line_x[i], ly = line_y[i], ldx = line_dx[i], ldy = line_dy[i];
+    const float whole = line_length[i];
+    const float ax = x0[k] - lx, ay = y0[k] - ly, bx = x1[k] - lx, by = y1[k] - ly;
+    const float along_a = ax * ldx + ay * ldy, along_b = bx * ldx + by * ldy;
+    const float across_a = ay * ldx - ax * ldy, across_b = by * ldx - bx * ldy;
+    const float first = std::max(std::min(along_a, along_b), 0.0f);
+    const float last = std::min(std::max(along_a, along_b), whole);
+    const float extent = along_b - along_a;
+    // Perpendicular segments have no extent; their sine keeps them out of every gate.
+    const float inverse = 1.0f / (std::abs(extent) < 1e-6f ? 1e-6f : extent);
+    const float u0 = (first - along_a) * inverse, u1 = (last - along_a) * inverse;
+    const float h0 = across_a + u0 * (across_b - across_a);
+    const float h1 = across_a + u1 * (across_b - across_a);
+    const float sine = std::abs(ldx * dy[k] - ldy * dx[k]);
+    const float square = 0.5f * (h0 * h0 + h1 * h1), overlap = last - first;
+    const int32_t inside = (square < limits.square) & (sine < limits.sine) &
+                           (overlap > limits.overlap) &
+                           (overlap > limits.share * std::min(whole, length[k]));
+    // Far pairs are clamped, not skipped: the loop has no branch.
+    const float value = Exp(std::max(square_factor * square + sine_factor * sine * sine, -60.0f));
+    // A mask, since a condition would become a branch.
+    e[k] = std::bit_cast<float>(std::bit_cast<int32_t>(value) & -inside);
+    out_overlap[k] = overlap;
+    out_begin[k] = u0;
+    out_end[k] = u1;
+    out_square[k] = square;
+  }
+}
+
+PLUMB_SIMD_CLONES void GatherKernel(size_t count, const int32_t* __restrict index,
+                                    const float* __restrict in, float* __restrict out) {
+  for (size_t k = 0; k < count; ++k) out[k] = in[index[k]];
+}
+
+}  // namespace
+
+void PairList::Pairs::Resize(size_t count) {
+  line.resize(count);
+  segment.resize(count);
+  for (std::vector<float>* column :
+       {&weight, &overlap, &begin, &end, &x0, &y0, &x1, &y1, &square}) {
+    column->resize(count);
+  }
+}
+
+void PairList::Build(const ProjectedLines& lines, const SegmentTable& segments,
+                     const AssociationGates& gates, double slack_px) {
+  const Limits limits = LimitsOf(gates, static_cast<float>(slack_px));
+  const float half_width =
+      limits.sine < 1.0f ? std::asin(limits.sine) + kAngleSlack : std::numbers::pi_v<float>;
+  num_lines_ = lines.size();
+  num_segments_ = segments.size();
+  line_.clear();
+  segment_.clear();
+  if (inside_.size() < segments.size() + kLanes) inside_.resize(segments.size() + kLanes);
+  for (size_t i = 0; i < lines.size() && line_.size() < kMaxPairs; ++i) {
+    if (!(lines.length[i] > 0.0f)) continue;
+    const Line line{lines.x[i], lines.y[i], lines.direction_x[i], lines.direction_y[i],
+                    lines.length[i]};
+    for (const SegmentTable::Range range : segments.Within(lines.angle[i], half_width)) {
+      const size_t b = range.begin, count = range.end - range.begin;
+      if (count == 0) continue;
+      InsideKernel(line, limits, Padded(count), segments.x0.data() + b, segments.y0.data() + b,
+                   segments.x1.data() + b, segments.y1.data() + b, segments.direction_x.data() + b,
+                   segments.direction_y.data() + b, segments.length.data() + b, inside_.data());
+      for (size_t k = 0; k < count; ++k) {
+        if (inside_[k] == 0) continue;
+        line_.push_back(static_cast<int32_t>(i));
+        segment_.push_back(static_cast<int32_t>(b + k));
+      }
+    }
+  }
+  num_listed_ = std::min(line_.size(), kMaxPairs);
+  line_.resize(num_listed_);
+  segment_.resize(num_listed_);
+  const size_t padded = Padded(num_listed_);
+  line_.resize(padded, 0);
+  // The row after the last is padding that overlaps nothing.
+  segment_.resize(padded, static_cast<int32_t>(segments.size()));
+  const auto gather = [&](const std::vector<float>& in, std::vector<float>* out) {
+    out->resize(padded);
+    GatherKernel(padded, segment_.data(), in.data(), out->data());
+  };
+  gather(segments.x0, &x0_);
+  gather(segments.y0, &y0_);
+  gather(segments.x1, &x1_);
+  gather(segments.y1, &y1_);
+  gather(segments.direction_x, &direction_x_);
+  gather(segments.direction_y, &direction_y_);
+  gather(segments.length, &length_);
+  for (std::vector<float>* column : {&e_, &overlap_, &begin_, &end_, &square_}) {
+    column->resize(padded);
+  }
+  kept_.resize(padded);
+  line_sum_.resize(num_lines_);
+  segment_sum_.resize(num_segments_);
+}
+
+void PairList::Weigh(const ProjectedLines& lines, const AssociationGates& gates) {
+  const size_t padded = line_.size();
+  WeighKernel(LimitsOf(gates, 0.0f), static_cast<float>(-0.5 / (gates.sigma_px * gates.sigma_px)),
+              static_cast<float>(-0.5 / (gates.sigma_sine * gates.sigma_sine)), padded,
+              line_.data(), lines.x.data(), lines.y.data(), lines.direction_x.data(),
+              lines.direction_y.data(), lines.length.data(), x0_.data(), y0_.data(), x1_.data(),
+              y1_.data(), direction_x_.data(), direction_y_.data(), length_.data(), e_.data(),
+              overlap_.data(), begin_.data(), end_.data(), square_.data());
+  std::fill(line_sum_.begin(), line_sum_.end(), kOutlierMass);
+  std::fill(segment_sum_.begin(), segment_sum_.end(), kOutlierMass);
+  size_t kept = 0;
+  for (size_t k = 0; k < num_listed_; ++k) {
+    kept_[kept] = static_cast<int32_t>(k);
+    if (!(e_[k] > 0.0f)) continue;
+    ++kept;
+    line_sum_[static_cast<size_t>(line_[k])] += e_[k];
+    segment_sum_[static_cast<size_t>(segment_[k])] += e_[k];
+  }
+  pairs_.Resize(kept);
+  for (size_t p = 0; p < kept; ++p) {
+    const auto k = static_cast<size_t>(kept_[p]);
+    const float bound = std::min(1.0f / segment_sum_[static_cast<size_t>(segment_[k])],
+                                 kFragmentsPerLine / line_sum_[static_cast<size_t>(line_[k])]);
+    pairs_.line[p] = line_[k];
+    pairs_.segment[p] = segment_[k];
+    pairs_.weight[p] = e_[k] * bound;
+    pairs_.overlap[p] = overlap_[k];
+    pairs_.begin[p] = begin_[k];
+    pairs_.end[p] = end_[k];
+    pairs_.x0[p] = x0_[k] + begin_[k] * (x1_[k] - x0_[k]);
+    pairs_.y0[p] = y0_[k] + begin_[k] * (y1_[k] - y0_[k]);
+    pairs_.x1[p] = x0_[k] + end_[k] * (x1_[k] - x0_[k]);
+    pairs_.y1[p] = y0_[k] + end_[k] * (y1_[k] - y0_[k]);
+    pairs_.square[p] = square_[k];
+  }
+}
+
+}  // namespace plumb

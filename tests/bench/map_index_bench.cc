@@ -195,7 +195,7 @@ void BM_NearestKeyFrames(benchmark::State& state) {
   }
 }
 
-#define PLUMB_SIZES ->Arg(2000)->Arg(50000)->Arg(400000)->Unit(benchmark::kMicrosecond)
+#define PLUMB_SIZES ->Arg(2000)->Arg(10000)->Arg(100000)->Arg(1000000)->Unit(benchmark::kMicrosecond)
 BENCHMARK(BM_MapIndex) PLUMB_SIZES;
 BENCHMARK(BM_BoostRtree) PLUMB_SIZES;
 BENCHMARK(BM_AllLines) PLUMB_SIZES;

@@ -33,7 +33,10 @@ nn::Model TinyModel() {
 const std::vector<std::byte>& TinyModelBytes() {
   static const std::vector<std::byte> bytes = [] {
     const nn::Model model = TinyModel();
-    return nn::ModelBytes(model, nn::MetadataOf(model.spec));
+    nn::Metadata metadata = nn::MetadataOf(model.spec);
+    metadata["duplicate_decay"] = "0.5";
+    metadata["duplicate_distance"] = "100";  // The tiny network's lines are long and far apart.
+    return nn::ModelBytes(model, metadata);
   }();
   return bytes;
 }
@@ -112,7 +115,7 @@ TEST_F(VlseDetectorTest, AgreesWithTheCpuTwins) {
                                                            {model->spec.mean, model->spec.std});
   const std::vector<float> planes =
       nn::reference::RunPlan(nn::BuildLayerPlan(*model, kInputWidth, kInputHeight), tensor);
-  const std::vector<DecodedLine> lines =
+  std::vector<DecodedLine> lines =
       DecodeLinesReference(planes,
                            {.width_cells = kInputWidth / 4,
                             .height_cells = kInputHeight / 4,
@@ -121,6 +124,11 @@ TEST_F(VlseDetectorTest, AgreesWithTheCpuTwins) {
                             .nms_decay = model->spec.nms_decay,
                             .displacement_scale = model->spec.displacement_scale},
                            100, 70);
+  const float best_without_decay = lines.at(20).score;
+  DecayDuplicates({model->spec.duplicate_distance, model->spec.duplicate_decay},
+                  kInputWidth / 400.f, kInputHeight / 280.f, 0.05f, &lines);
+  ASSERT_LT(lines.at(20).score, best_without_decay)
+      << "The picture has no duplicates to test with.";
   std::vector<Segment2> expected;
   for (const DecodedLine& line : lines) {
     Segment2 segment;

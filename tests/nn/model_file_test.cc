@@ -38,11 +38,23 @@ TEST(ModelFile, ReadsBackWhatWasWritten) {
   EXPECT_EQ(read->spec.input_width, 128);
   EXPECT_EQ(read->spec.input_height, 64);
   EXPECT_EQ(read->spec.top_k, 200);
+  EXPECT_EQ(read->spec.duplicate_decay, 1.0f) << "Files without it rank duplicates as they did.";
   EXPECT_EQ(read->spec.displacement_scale, 64.0f);
   EXPECT_EQ(read->spec.std[1], 22.124f);
   ASSERT_EQ(read->tensors.size(), model.tensors.size());
   for (const auto& [name, tensor] : model.tensors)
     EXPECT_EQ(read->tensors.at(name).data, tensor.data);
+}
+
+TEST(ModelFile, ReadsHowDuplicatesAreRanked) {
+  const Model model = RandomModel(SmallSpec(), 1);
+  Metadata metadata = MetadataOf(model.spec);
+  metadata["duplicate_decay"] = "0.4";
+  metadata["duplicate_distance"] = "3.5";
+  const auto read = ParseModel(ModelBytes(model, metadata));
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->spec.duplicate_decay, 0.4f);
+  EXPECT_EQ(read->spec.duplicate_distance, 3.5f);
 }
 
 TEST(ModelFile, ReadsBasicBlocksAndTwoStacks) {
@@ -121,6 +133,8 @@ TEST(ModelFile, RefusesMetadataOutOfRange) {
                                                      {"score_threshold", "1.5"},
                                                      {"score_threshold", ""},
                                                      {"nms_decay", "-1"},
+                                                     {"duplicate_decay", "1.1"},
+                                                     {"duplicate_distance", "-2"},
                                                      {"displacement_scale", "inf"}};
   for (const auto& [key, value] : bad) {
     Metadata metadata = MetadataOf(model.spec);

@@ -73,6 +73,7 @@ void AddDetect(CLI::App& program, PendingRun& pending) {
       program, pending, "detect", "Find line segments in images",
       [](CLI::App& command, DetectOptions& options) {
         command.add_option("images", options.images, "Image files")->required();
+        options.detector.score_threshold = kCandidateScore;
         BindDetectorOptions(command, options.detector);
         command.add_flag(
             "--refined", options.refined,
@@ -85,7 +86,9 @@ void AddDetect(CLI::App& program, PendingRun& pending) {
             "Examples:\n"
             "  plumbline detect photo.jpg --model lsd\n"
             "  plumbline detect a.jpg b.jpg --model nano --json > lines.json\n"
-            "  plumbline detect photo.jpg --refined --json");
+            "  plumbline detect photo.jpg --refined --score-threshold 0.3 --json\n"
+            "Without --score-threshold, unlike maps and poses, candidates down to 0.01 are "
+            "listed.");
       },
       RunDetect);
 }

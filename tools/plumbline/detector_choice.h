@@ -13,6 +13,10 @@
 
 namespace plumb::tools {
 
+/// Score threshold of commands that report scores: also the candidates that a pose is not built on,
+/// which are for the reader to judge.
+inline constexpr float kCandidateScore = 0.01f;
+
 /// Options that every command with a detector shares.
 struct DetectorOptions {
   std::string model = "nano";

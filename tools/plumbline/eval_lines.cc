@@ -138,6 +138,7 @@ void AddEvalLines(CLI::App& eval, PendingRun& pending) {
       eval, pending, "lines",
       "Score a line detector on annotated images (sAP, F^H and AP^H, in percent)",
       [](CLI::App& command, EvalLinesOptions& options) {
+        options.detector.score_threshold = kCandidateScore;
         BindDetectorOptions(command, options.detector);
         command
             .add_option(

@@ -31,6 +31,8 @@ def main(argv=None):
     parser.add_argument("--score-threshold", type=float, default=0.1)
     parser.add_argument("--top-k", type=int, default=evaluate.TOP_K)
     parser.add_argument("--nms-decay", type=float, default=evaluate.NMS_DECAY)
+    parser.add_argument("--duplicate-decay", type=float, default=evaluate.DUPLICATE_DECAY)
+    parser.add_argument("--duplicate-distance", type=float, default=evaluate.DUPLICATE_DISTANCE)
     parser.add_argument("--description", default="")
     args = parser.parse_args(argv)
     if args.random:
@@ -41,7 +43,8 @@ def main(argv=None):
     size = args.size or PRESETS[preset].size
     metadata = weights_file.metadata_of(
         model, preset, size, evaluate.DISPLACEMENT_SCALE, score_threshold=args.score_threshold, top_k=args.top_k,
-        nms_decay=args.nms_decay, description=args.description or text,
+        nms_decay=args.nms_decay, duplicate_decay=args.duplicate_decay, duplicate_distance=args.duplicate_distance,
+        description=args.description or text,
     )
     weights_file.save_model(args.out, model, metadata, half=not args.fp32)
 

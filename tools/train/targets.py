@@ -72,6 +72,18 @@ def encode(lines, scores, width, height):
     return maps
 
 
+def decay_duplicates(lines, scores, distance, decay):
+    """Scores times `decay` for every better line whose ends are near: squared distances in cells sum to less than `distance`.
+
+    lines [N, 4] in cells, best score first; returns both, best new score first.
+    """
+    a, b = lines.reshape(-1, 1, 2, 2), lines.reshape(1, -1, 2, 2)
+    near = np.minimum(((a - b) ** 2).sum((2, 3)), ((a - b[:, :, ::-1]) ** 2).sum((2, 3))) < distance
+    scores = scores * decay ** np.tril(near, -1).sum(1)
+    order = np.argsort(-scores, kind="stable")
+    return lines[order], scores[order]
+
+
 def decode(p, offset, dis, top_k, nms_decay=0.8, score_threshold=0.0):
     """Maps p [h, w] in [0, 1], offset [2, h, w] in [0, 1], dis [2, h, w] in cells -> lines [K, 4] in cells, scores [K] descending."""
     height, width = p.shape

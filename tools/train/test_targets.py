@@ -16,7 +16,7 @@ except ImportError:
     torch = None
 
 from sap import average_precision, sap
-from targets import canonical, clip_lines, decode, encode
+from targets import canonical, clip_lines, decay_duplicates, decode, encode
 
 
 def round_trip(lines, size=80):
@@ -80,6 +80,12 @@ class Targets(unittest.TestCase):
         p[3, 3], p[3, 4] = 0.9, 0.5
         _, scores = decode(p, np.zeros((2, 8, 8)), np.zeros((2, 8, 8)), 2, nms_decay=0.8)
         np.testing.assert_allclose(scores, [0.9, 0.4])
+
+    def test_duplicates_rank_below_distinct_lines(self):
+        lines = np.array([[0, 0, 10, 0], [10, 0.5, 0, 0.5], [0, 20, 10, 20], [0, 0.4, 10, 0.4]], float)
+        ranked, scores = decay_duplicates(lines, np.array([0.9, 0.8, 0.5, 0.4]), 2.0, 0.5)
+        np.testing.assert_allclose(scores, [0.9, 0.5, 0.4, 0.1])  # the last one has two better ones near
+        np.testing.assert_array_equal(ranked, lines[[0, 2, 1, 3]])
 
     def test_equal_scores_keep_the_order_of_their_index(self):
         p = np.zeros((8, 8))

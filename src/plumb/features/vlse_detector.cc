@@ -40,15 +40,17 @@ Result<std::unique_ptr<VlseDetector>> VlseDetector::Create(const VlseDetectorOpt
   detector->network_ = std::move(*network);
   const nn::NetworkInfo& info = detector->network_->info();
   const nn::ModelSpec& spec = model->spec;
-  Result<std::unique_ptr<VlseDecoder>> decoder = VlseDecoder::Create(
-      detector->device_,
-      {.width_cells = info.output_width,
-       .height_cells = info.output_height,
-       .max_lines = options.max_lines.value_or(spec.top_k),
-       .score_threshold = options.score_threshold.value_or(spec.score_threshold),
-       .nms_decay = spec.nms_decay,
-       .displacement_scale = spec.displacement_scale},
-      info.family);
+  detector->score_threshold_ = options.score_threshold.value_or(spec.score_threshold);
+  detector->duplicate_decay_ = {spec.duplicate_distance, spec.duplicate_decay};
+  Result<std::unique_ptr<VlseDecoder>> decoder =
+      VlseDecoder::Create(detector->device_,
+                          {.width_cells = info.output_width,
+                           .height_cells = info.output_height,
+                           .max_lines = options.max_lines.value_or(spec.top_k),
+                           .score_threshold = detector->score_threshold_,
+                           .nms_decay = spec.nms_decay,
+                           .displacement_scale = spec.displacement_scale},
+                          info.family);
   if (!decoder) return decoder.error();
   detector->decoder_ = std::move(*decoder);
 
@@ -134,10 +136,15 @@ Result<std::vector<Segment2>> VlseDetector::Collect() {
   stage_times_ = commands_->StageTimes();
 
   const ImagePreprocessor::Options& image = preprocessor_->GetOptions();
-  const std::span<const DecodedLine> lines = decoder_->Lines();
+  const nn::NetworkInfo& network = network_->info();
+  const std::span<const DecodedLine> decoded = decoder_->Lines();
+  lines_.assign(decoded.begin(), decoded.end());
+  DecayDuplicates(duplicate_decay_, static_cast<float>(network.output_width) / image.image_width_px,
+                  static_cast<float>(network.output_height) / image.image_height_px,
+                  score_threshold_, &lines_);
   std::vector<Segment2> segments;
-  segments.reserve(lines.size());
-  for (const DecodedLine& line : lines) {
+  segments.reserve(lines_.size());
+  for (const DecodedLine& line : lines_) {
     Segment2 segment;
     segment.start = Eigen::Vector2d(line.start_x, line.start_y);
     segment.end = Eigen::Vector2d(line.end_x, line.end_y);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "plumb/base/result.h"
+#include "plumb/features/duplicate_decay.h"
 #include "plumb/features/image_preprocessor.h"
 #include "plumb/features/line_detector.h"
 #include "plumb/features/vlse_decoder.h"
@@ -83,6 +84,8 @@ class VlseDetector : public LineDetector {
   std::shared_ptr<gpu::Device> device_;
   std::string name_;
   TensorNormalization normalization_;
+  DuplicateDecay duplicate_decay_;
+  float score_threshold_ = 0.0f;
   nn::KernelFamily family_ = nn::KernelFamily::kAuto;
   std::chrono::nanoseconds timeout_{0};
   std::unique_ptr<nn::Network> network_;
@@ -90,6 +93,7 @@ class VlseDetector : public LineDetector {
   std::unique_ptr<ImagePreprocessor> preprocessor_;  // Of the last image's size and format.
   std::unique_ptr<gpu::CommandList> commands_;       // Last: it uses all of the above.
   std::vector<gpu::StageTime> stage_times_;
+  std::vector<DecodedLine> lines_;  // Of the last image.
 };
 
 }  // namespace plumb

@@ -106,6 +106,8 @@ Result<ModelSpec> ParseSpec(const Safetensors& file) {
   metadata.Number("score_threshold", spec.score_threshold);
   metadata.Number("top_k", spec.top_k);
   metadata.Number("nms_decay", spec.nms_decay, false);
+  metadata.Number("duplicate_decay", spec.duplicate_decay, false);
+  metadata.Number("duplicate_distance", spec.duplicate_distance, false);
   if (const auto text = file.metadata.find("description"); text != file.metadata.end()) {
     spec.description = text->second;
   }

@@ -69,6 +69,13 @@ Status Validate(const ModelSpec& spec) {
   if (!(spec.nms_decay >= 0 && spec.nms_decay <= 1)) {
     return Bad("nms_decay", std::to_string(spec.nms_decay) + ", must be within 0..1");
   }
+  if (!(spec.duplicate_decay >= 0 && spec.duplicate_decay <= 1)) {
+    return Bad("duplicate_decay", std::to_string(spec.duplicate_decay) + ", must be within 0..1");
+  }
+  if (!(spec.duplicate_distance >= 0 && spec.duplicate_distance <= 1e6f)) {
+    return Bad("duplicate_distance",
+               std::to_string(spec.duplicate_distance) + ", must be within 0..1000000");
+  }
   if (spec.top_k < 1 || spec.top_k > 65536) {
     return Bad("top_k", std::to_string(spec.top_k) + ", must be within 1..65536");
   }

@@ -35,6 +35,8 @@ struct ModelSpec {
   float score_threshold = 0.1f;     ///< Default of the decoder, 0..1.
   int top_k = 300;                  ///< Default of the decoder.
   float nms_decay = 0.8f;           ///< Factor on the score of non-maxima, 0..1.
+  float duplicate_decay = 1.0f;     ///< Factor on a line's score for every better one as near as
+  float duplicate_distance = 2.0f;  ///< this: squared distances of the ends, summed, in cells.
   std::string description;
 
   int channels() const { return 4 * width; }  ///< Of the hourglass stream.

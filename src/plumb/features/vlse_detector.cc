@@ -139,9 +139,11 @@ Result<std::vector<Segment2>> VlseDetector::Collect() {
   const nn::NetworkInfo& network = network_->info();
   const std::span<const DecodedLine> decoded = decoder_->Lines();
   lines_.assign(decoded.begin(), decoded.end());
-  DecayDuplicates(duplicate_decay_, static_cast<float>(network.output_width) / image.image_width_px,
-                  static_cast<float>(network.output_height) / image.image_height_px,
-                  score_threshold_, &lines_);
+  DecayDuplicates(
+      duplicate_decay_,
+      static_cast<float>(network.output_width) / static_cast<float>(image.image_width_px),
+      static_cast<float>(network.output_height) / static_cast<float>(image.image_height_px),
+      score_threshold_, &lines_);
   std::vector<Segment2> segments;
   segments.reserve(lines_.size());
   for (const DecodedLine& line : lines_) {

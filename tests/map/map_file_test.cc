@@ -40,6 +40,7 @@ void WriteUnchecked(const LineMap& map, const std::string& directory) {
   MapManifest manifest = DescribeTiles(tiles);
   manifest.detector = map.detector;
   manifest.covariance_factor = map.covariance_factor;
+  manifest.covariance_growth = map.covariance_growth;
   manifest.origin = origin;
   std::filesystem::create_directories(directory + "/tiles");
   Spill(directory + "/manifest.json", WriteManifest(manifest));
@@ -74,6 +75,7 @@ TEST_F(MapFileTest, KeepsEverythingWithinFloatOfTheOrigin) {
 
   EXPECT_EQ(read->detector, map.detector);
   EXPECT_EQ(read->covariance_factor, map.covariance_factor);
+  EXPECT_EQ(read->covariance_growth, map.covariance_growth);
   EXPECT_EQ(read->sighting_begin, map.sighting_begin);
   ASSERT_EQ(read->lines.size(), map.lines.size());
   for (size_t i = 0; i < map.lines.size(); ++i) {
@@ -260,6 +262,8 @@ TEST_F(MapFileTest, RefusesHostileManifests) {
       {"a negative factor", "\"covariance_factor\": 2.25", "\"covariance_factor\": -1.0"},
       {"a factor that is null", "\"covariance_factor\": 2.25", "\"covariance_factor\": null"},
       {"no factor", "covariance_factor", "covariance"},
+      {"a negative growth", "\"covariance_growth\": 0.75", "\"covariance_growth\": -0.75"},
+      {"a growth that is null", "\"covariance_growth\": 0.75", "\"covariance_growth\": null"},
       {"a detector that is a number", "\"lsd\"", "7"},
       {"a detector that is not UTF-8", "\"lsd\"", "\"\xff\xfe\""},
       {"a huge detector", "\"lsd\"", "\"" + std::string(5000, 'x') + "\""},

@@ -1,15 +1,13 @@
-// The covariance factor of a map from frames that were left out of it.
+// The covariance of a map from what its own key frames show.
 #include "plumb/runtime/covariance_calibration.h"
 
 #include <cmath>
-#include <limits>
-#include <optional>
 #include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "plumb/geometry/line_projection.h"
+#include "plumb/runtime/covariance_factor.h"
 #include "support/wall_scene.h"
 
 namespace plumb {
@@ -17,93 +15,92 @@ namespace {
 
 const testing::WallScene kScene;
 
-LineMap Map() {
-  const std::vector<Rigid3> poses = testing::WallScene::KeyFramePoses();
-  return kScene.MakeMap(poses);
-}
-
-// Frames between the key frames. `pose_error_m` puts the frame's stated pose beside the one that
-// its segments were made at, as an error common to all its lines.
-std::vector<HeldOutFrame> Frames(const LineMap& map, int count, double noise_px,
-                                 double pose_error_m) {
+/// Key frames on a line from the origin, `step_m` apart. Their segments are off by `noise_px` at
+/// each end; their poses, and all that they lifted with them, by up to about `pose_error_m`.
+LineMap Map(int num_key_frames, double step_m, double noise_px, double pose_error_m) {
   std::mt19937 random(23);
   std::normal_distribution<double> normal;
-  std::vector<HeldOutFrame> frames;
-  for (int k = 0; k < count; ++k) {
-    const double a = 0.7 * k + 0.3;
-    const Eigen::Vector3d center(0.2 * std::cos(a), 0.15 * std::sin(a), 0.1 * std::cos(2 * a));
+  std::vector<Rigid3> poses;
+  for (int k = 0; k < num_key_frames; ++k) {
+    const double a = 0.7 * k;
+    const Eigen::Vector3d center(step_m * k - 0.2, 0.1 * std::sin(a), 0.05 * std::cos(2 * a));
     const Eigen::Quaterniond rotation = ExpSo3({0.03 * std::sin(a), 0.2, 0.02 * std::cos(a)});
-    const Rigid3 cam_from_world{rotation, -(rotation * center)};
-    HeldOutFrame frame;
-    frame.camera = kScene.camera;
-    for (const MapLine& line : map.lines) {
-      std::optional<Segment2> segment =
-          ProjectSegment(frame.camera, cam_from_world, line.segment_in_world);
-      if (!segment || segment->Length() < 12.0) continue;
-      for (Eigen::Vector2d* end : {&segment->start, &segment->end}) {
+    poses.push_back({rotation, -(rotation * center)});
+  }
+  LineMap map = kScene.MakeMap(poses);
+  for (KeyFrame& key_frame : map.key_frames) {
+    const Eigen::Vector3d shift =
+        pose_error_m * Eigen::Vector3d(normal(random), normal(random), normal(random));
+    key_frame.cam_from_world.translation -= key_frame.cam_from_world.rotation * shift;
+    for (LiftedSegment& segment : key_frame.segments) {
+      segment.segment_in_world.start += shift;
+      segment.segment_in_world.end += shift;
+      for (Eigen::Vector2d* end : {&segment.segment_px.start, &segment.segment_px.end}) {
         *end += noise_px * Eigen::Vector2d(normal(random), normal(random));
       }
-      frame.segments.push_back(*segment);
     }
-    frame.cam_from_world = cam_from_world;
-    frame.cam_from_world.translation +=
-        pose_error_m * Eigen::Vector3d(normal(random), normal(random), normal(random));
-    frames.push_back(frame);
   }
-  return frames;
-}
-
-CovarianceCalibration Calibrate(const LineMap& map, const std::vector<HeldOutFrame>& frames) {
-  const Result<CovarianceCalibration> calibration = CalibrateCovariance(map, frames, {});
-  EXPECT_TRUE(calibration.has_value());
-  return calibration ? *calibration : CovarianceCalibration();
+  return map;
 }
 
 TEST(CovarianceCalibration, IndependentNoiseNeedsNoLargeFactor) {
-  const LineMap map = Map();
-  const CovarianceCalibration calibration = Calibrate(map, Frames(map, 15, 0.5, 0.0));
-  EXPECT_GE(calibration.num_refined, 12u);
-  EXPECT_GT(calibration.factor, 0.1);
-  EXPECT_LT(calibration.factor, 5.0);
+  const CovarianceCalibration calibration = CalibrateCovariance(Map(12, 0.04, 0.5, 0.0));
+  EXPECT_GE(calibration.num_errors, 50u);
+  EXPECT_GT(calibration.factor + 0.2 * calibration.growth, 0.1);
+  EXPECT_LT(calibration.factor + 0.2 * calibration.growth, 2.0);
 }
 
-TEST(CovarianceCalibration, CommonErrorsRaiseTheFactor) {
-  const LineMap map = Map();
-  const double independent = Calibrate(map, Frames(map, 15, 0.5, 0.0)).factor;
-  const double common = Calibrate(map, Frames(map, 15, 0.5, 0.01)).factor;
-  EXPECT_GT(common, 3.0 * independent);
-}
-
-TEST(CovarianceCalibration, TheMapsOwnFactorIsTakenIntoAccount) {
-  LineMap map = Map();
-  const std::vector<HeldOutFrame> frames = Frames(map, 15, 0.5, 0.01);
-  const double factor = Calibrate(map, frames).factor;
-  map.covariance_factor = factor;
-  EXPECT_NEAR(Calibrate(map, frames).factor / factor, 1.0, 0.1);
+TEST(CovarianceCalibration, ErrorsOfKeyFramesRaiseIt) {
+  LineMap exact = Map(12, 0.04, 0.5, 0.0), off = Map(12, 0.04, 0.5, 0.01);
+  const auto factor_at = [](LineMap* map, double distance) {
+    const CovarianceCalibration calibration = CalibrateCovariance(*map);
+    map->covariance_factor = calibration.factor;
+    map->covariance_growth = calibration.growth;
+    return CovarianceFactor(*map, distance);
+  };
+  EXPECT_GT(factor_at(&off, 0.15), 10.0 * factor_at(&exact, 0.15));
 }
 
 TEST(CovarianceCalibration, Repeats) {
-  const LineMap map = Map();
-  const std::vector<HeldOutFrame> frames = Frames(map, 8, 0.5, 0.0);
-  EXPECT_EQ(Calibrate(map, frames).factor, Calibrate(map, frames).factor);
+  const LineMap map = Map(8, 0.04, 0.5, 0.005);
+  const CovarianceCalibration a = CalibrateCovariance(map), b = CalibrateCovariance(map);
+  EXPECT_EQ(a.factor, b.factor);
+  EXPECT_EQ(a.growth, b.growth);
 }
 
-TEST(CovarianceCalibration, TooFewFramesKeepTheMapsFactor) {
-  LineMap map = Map();
+TEST(CovarianceCalibration, PerfectKeyFramesGiveASmallPositiveFactor) {
+  const CovarianceCalibration calibration = CalibrateCovariance(Map(8, 0.04, 0.0, 0.0));
+  EXPECT_GT(calibration.factor, 0.0);
+  EXPECT_LT(calibration.factor, 0.1);
+}
+
+TEST(CovarianceCalibration, TooFewKeyFramesKeepTheMapsOwnValues) {
+  LineMap map = Map(3, 0.04, 0.5, 0.01);
   map.covariance_factor = 2.5;
-  const CovarianceCalibration few = Calibrate(map, Frames(map, 4, 0.5, 0.01));
-  EXPECT_LE(few.num_refined, 4u);
-  EXPECT_EQ(few.factor, 2.5);
-  EXPECT_EQ(Calibrate(map, {}).factor, 2.5);
+  map.covariance_growth = 7.0;
+  const CovarianceCalibration calibration = CalibrateCovariance(map);
+  EXPECT_EQ(calibration.num_errors, 0u);
+  EXPECT_EQ(calibration.factor, 2.5);
+  EXPECT_EQ(calibration.growth, 7.0);
+  EXPECT_EQ(CalibrateCovariance(LineMap{}).factor, 1.0);
 }
 
-TEST(CovarianceCalibration, RefusesABrokenFrame) {
-  const LineMap map = Map();
-  std::vector<HeldOutFrame> frames = Frames(map, 2, 0.5, 0.0);
-  frames[1].cam_from_world.translation.x() = std::numeric_limits<double>::quiet_NaN();
-  const auto calibration = CalibrateCovariance(map, frames, {});
-  ASSERT_FALSE(calibration.has_value());
-  EXPECT_EQ(calibration.error().code, ErrorCode::kInvalidArgument);
+TEST(CovarianceFactor, GrowsWithTheDistanceUpToABound) {
+  LineMap map;
+  map.covariance_factor = 2.0;
+  map.covariance_growth = 50.0;
+  EXPECT_DOUBLE_EQ(CovarianceFactor(map, 0.0), 2.0);
+  EXPECT_DOUBLE_EQ(CovarianceFactor(map, 0.4), 22.0);
+  EXPECT_DOUBLE_EQ(CovarianceFactor(map, 10.0), CovarianceFactor(map, kMaxFactorDistance));
+}
+
+TEST(CovarianceFactor, DistanceIsTheMeanOfTheKeyFrames) {
+  LineMap map;
+  map.key_frames.resize(2);
+  map.key_frames[0].cam_from_world = {ExpSo3({0.0, 0.1, 0.0}), {}};
+  map.key_frames[1].cam_from_world = {Eigen::Quaterniond::Identity(), {0.3, 0.0, 0.0}};
+  EXPECT_NEAR(MeanDistance(map, std::vector<uint32_t>{0, 1}, Rigid3{}), 0.2, 1e-12);
+  EXPECT_EQ(MeanDistance(map, {}, Rigid3{}), 0.0);
 }
 
 }  // namespace

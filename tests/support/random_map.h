@@ -26,6 +26,7 @@ inline LineMap MakeRandomMap(const RandomMapSize& size, unsigned seed,
   LineMap map;
   map.detector = "lsd";
   map.covariance_factor = 2.25;
+  map.covariance_growth = 0.75;
   for (uint32_t k = 0; k < size.key_frames; ++k) {
     KeyFrame key_frame;
     key_frame.timestamp_ns = 1'000'000'000LL + 33'333'333LL * k;

@@ -36,10 +36,26 @@ TEST(Program, WithoutACommandIsWrongUsage) {
 }
 
 TEST(Program, EveryCommandHasHelp) {
-  for (const char* command :
-       {"", "detect", "map", "map build", "map info", "map export", "replay", "eval", "eval lines",
-        "eval repeatability", "eval trajectory", "bench", "bench net", "bench frame",
-        "bench refine", "synth", "device", "device list", "version"}) {
+  for (const char* command : {"",
+                              "detect",
+                              "map",
+                              "map build",
+                              "map info",
+                              "map export",
+                              "replay",
+                              "eval",
+                              "eval controls",
+                              "eval lines",
+                              "eval repeatability",
+                              "eval trajectory",
+                              "bench",
+                              "bench net",
+                              "bench frame",
+                              "bench refine",
+                              "synth",
+                              "device",
+                              "device list",
+                              "version"}) {
     const ProgramRun run = RunPlumbline(std::string(command) + " --help");
     EXPECT_EQ(run.exit_code, 0) << command;
     EXPECT_THAT(run.out, HasSubstr("Usage:")) << command;

@@ -106,8 +106,8 @@ TEST_F(Replay, MapInfoCountsWhatWasBuilt) {
 }
 
 TEST_F(Replay, CalibrationOnTooFewKeyFramesSaysSo) {
-  const ProgramRun run = RunPlumbline(BuildArguments(room_->path()) +
-                                      " --points none --calibrate --out " + (dir_ / "map"));
+  const ProgramRun run =
+      RunPlumbline(BuildArguments(room_->path()) + " --points none --out " + (dir_ / "map"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("uncalibrated"));
   const json info = json::parse(RunPlumbline("map info " + (dir_ / "map") + " --json").out);
@@ -163,6 +163,8 @@ TEST_F(Replay, RefinesEveryFrameAndSaysHowWell) {
   EXPECT_LT(report["refined"]["median_cm"].get<double>(), 1.0);
   EXPECT_LT(report["refined"]["median_deg"].get<double>(), 0.3);
   EXPECT_EQ(report["harmed"].get<double>(), 0.0);
+  EXPECT_EQ(report["normalised_error"]["frames"], report["status"]["REFINED"]);
+  EXPECT_GT(report["normalised_error"]["pose"]["median"].get<double>(), 0.0);
   int num_statuses = 0;
   for (const auto& [status, n] : report["status"].items()) num_statuses += n.get<int>();
   EXPECT_EQ(num_statuses, kNumQueries);
@@ -297,6 +299,20 @@ TEST_F(Replay, ABrokenImageStopsTheReplayHalfWayAndLeavesNoRun) {
   EXPECT_EQ(run.exit_code, 65) << run.err;
   EXPECT_THAT(run.err, HasSubstr(image));
   EXPECT_THAT(Entries(dir_.path()), IsEmpty());
+}
+
+TEST_F(Replay, ControlsAreNotRefinedAndOwnSegmentsAre) {
+  const ProgramRun run = RunPlumbline("eval controls --sequence " + room_->path() + " --frames " +
+                                      (*room_ / "splits/query.txt") + " --priors " + Priors() +
+                                      " --prior-size 5,1 --map " + Map() + " --model lsd --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_EQ(report["own"]["frames"], kNumQueries);
+  EXPECT_EQ(report["own"]["refined"].get<double>(), 1.0);
+  for (const char* control : {"mirrored", "random"}) {
+    EXPECT_EQ(report[control]["frames"], kNumQueries) << control;
+    EXPECT_EQ(report[control]["refined"].get<double>(), 0.0) << control;
+  }
 }
 
 TEST_F(Replay, EvalNeedsARunAndMatchingTruth) {

@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,7 +27,7 @@ struct MapBuildOptions {
   std::string sequence, frames, out;
   DetectorOptions detector;
   std::string points = "opencv";
-  bool calibrate = false;
+  bool calibrate = true;
   bool json = false;
 };
 
@@ -80,42 +79,15 @@ class KeyFrameReader {
   PointFrontEnd point_front_end_;
 };
 
-/// A second map without every fifth key frame, on which those show how large the errors are.
-class Calibrator {
- public:
-  explicit Calibrator(const MapBuilderOptions& options) : builder_(options) {}
-
-  Outcome Add(const LoadedKeyFrame& frame) {
-    if (++num_frames_ % 5 == 0) {
-      held_out_.push_back({frame.input.camera, frame.input.cam_from_world, frame.segments});
-      return std::nullopt;
-    }
-    KeyFrameInput input = frame.input;
-    input.points.clear();
-    const Status added = builder_.AddKeyFrame(std::move(input));
-    return added ? Outcome() : Failure{kExitBadData, added.error().message};
+/// Fits the map's covariance to what its own key frames show.
+void Calibrate(LineMap* map) {
+  const CovarianceCalibration calibration = CalibrateCovariance(*map);
+  if (calibration.num_errors < kMinCalibrationErrors) {
+    PrintRemark("too few key frames see the same place, the covariance stays uncalibrated");
   }
-
-  /// The factor stays as it is when too few of the left-out frames could be refined.
-  Outcome Calibrate(double* factor) {
-    const Result<LineMap> map = builder_.Build();
-    if (!map) return FailureFrom(map.error());
-    const auto calibration = CalibrateCovariance(*map, held_out_, PoseRefinerOptions{});
-    if (!calibration) return FailureFrom(calibration.error());
-    if (calibration->num_refined < kMinCalibrationFrames) {
-      PrintRemark(
-          "--calibrate: only " + std::to_string(calibration->num_refined) +
-          " of the left-out key frames could be refined, the covariance stays uncalibrated");
-    }
-    *factor = calibration->factor;
-    return std::nullopt;
-  }
-
- private:
-  MapBuilder builder_;
-  size_t num_frames_ = 0;
-  std::vector<HeldOutFrame> held_out_;
-};
+  map->covariance_factor = calibration.factor;
+  map->covariance_growth = calibration.growth;
+}
 
 Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, double seconds) {
   if (!options.json) {
@@ -153,8 +125,6 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   MapBuilderOptions builder_options;
   builder_options.detector = detector->Name();
   MapBuilder builder(builder_options);
-  std::optional<Calibrator> calibrator;
-  if (options.calibrate) calibrator.emplace(builder_options);
   {
     KeyFrameReader reader(sequence, detector.get(), options.points == "opencv");
     ProgressBar progress("key frames", frames.size());
@@ -162,9 +132,6 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
       if (Outcome interrupted = CheckInterrupt()) return interrupted;
       LoadedKeyFrame loaded;
       if (Outcome failed = reader.Read(frame, &loaded)) return failed;
-      if (calibrator) {
-        if (Outcome failed = calibrator->Add(loaded)) return failed;
-      }
       if (const Status added = builder.AddKeyFrame(std::move(loaded.input)); !added) {
         return Failure{kExitBadData, added.error().message};
       }
@@ -179,9 +146,7 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
     });
   }();
   if (!map) return FailureFrom(map.error());
-  if (calibrator) {
-    if (Outcome failed = calibrator->Calibrate(&map->covariance_factor)) return failed;
-  }
+  if (options.calibrate) Calibrate(&*map);
   WriteMapOptions write_options;
   write_options.overwrite = true;
   if (const Status written = WriteMap(*map, options.out, write_options); !written) {
@@ -216,8 +181,9 @@ void AddMapBuild(CLI::App& map, PendingRun& pending) {
             ->check(CLI::IsMember({"none", "opencv"}))
             ->capture_default_str();
         command.add_flag(
-            "--calibrate", options.calibrate,
-            "Calibrate the covariance on every fifth key frame, left out of a second map");
+            "--calibrate,!--no-calibrate", options.calibrate,
+            "Fit the covariance of poses to how well the key frames agree with each other (on by "
+            "default)");
         command.add_flag("--json", options.json, "Print what was built as JSON");
         command.footer(
             "Examples:\n"

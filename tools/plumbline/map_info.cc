@@ -62,6 +62,7 @@ Json Describe(const std::string& path, const LineMap& map) {
   report["segments"] = num_segments;
   report["points"] = num_points;
   report["covariance_factor"] = map.covariance_factor;
+  report["covariance_growth"] = map.covariance_growth;
   if (!map.lines.empty()) {
     report["median_sigma_m"] = Rounded(Percentile(sigma_m, 50.0), 6);
     report["min_m"] = {Rounded(low.x(), 3), Rounded(low.y(), 3), Rounded(low.z(), 3)};

@@ -65,8 +65,9 @@ struct LineMap {
   std::vector<KeyFrame> key_frames;
   /// Detector that made the segments; a query should use the same one.
   std::string detector;
-  /// Factor on the pose covariance, calibrated on left-out key frames; 1 when not calibrated.
-  double covariance_factor = 1.0;
+  /// Factor on the pose covariance: covariance_factor + covariance_growth x distance to the nearest
+  /// key frames [m + rad] (CovarianceFactor()). 1 and 0 when not calibrated.
+  double covariance_factor = 1.0, covariance_growth = 0.0;
 
   std::span<const LineSighting> SightingsOf(uint32_t line) const {
     return std::span(sightings).subspan(sighting_begin[line],

@@ -156,6 +156,11 @@ Status CheckMap(const LineMap& map) {
                                                   std::to_string(map.covariance_factor) +
                                                   ", not a positive number"};
   }
+  if (!(map.covariance_growth >= 0.0) || !std::isfinite(map.covariance_growth)) {
+    return Error{ErrorCode::kInvalidArgument, "The covariance growth is " +
+                                                  std::to_string(map.covariance_growth) +
+                                                  ", not a number from 0"};
+  }
   if (map.detector.size() > kMaxDetectorBytes || !IsUtf8(map.detector)) {
     return Error{ErrorCode::kInvalidArgument,
                  "The detector's name is longer than 1024 bytes or not UTF-8"};

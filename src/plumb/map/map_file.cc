@@ -167,11 +167,13 @@ Status WriteMap(const LineMap& map, const std::string& directory, const WriteMap
   Result<LineMap> decoded = DecodeTiles(tiles, origin);
   if (!decoded) return decoded.error();
   decoded->covariance_factor = map.covariance_factor;
+  decoded->covariance_growth = map.covariance_growth;
   if (Status status = CheckMap(*decoded); !status) return status;
 
   MapManifest manifest = DescribeTiles(tiles);
   manifest.detector = map.detector;
   manifest.covariance_factor = map.covariance_factor;
+  manifest.covariance_growth = map.covariance_growth;
   manifest.origin = origin;
 
   const size_t end = directory.find_last_not_of('/');
@@ -213,6 +215,7 @@ Result<LineMap> ReadMap(const std::string& directory) {
   if (!map) return in_file(map.error());
   map->detector = manifest->detector;
   map->covariance_factor = manifest->covariance_factor;
+  map->covariance_growth = manifest->covariance_growth;
   if (const Status status = CheckMap(*map); !status) {
     return in_file({ErrorCode::kCorruptData, status.error().message});
   }

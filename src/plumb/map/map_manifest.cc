@@ -130,6 +130,11 @@ Result<MapManifest> ParseMembers(const Json& root) {
   const auto factor = NumberOf(Member(root, "covariance_factor"));
   if (!factor) return Corrupt("has no covariance_factor");
   manifest.covariance_factor = *factor;
+  if (const Json* member = Member(root, "covariance_growth")) {  // absent in older maps
+    const auto growth = NumberOf(member);
+    if (!growth) return Corrupt("has a covariance_growth that is no number");
+    manifest.covariance_growth = *growth;
+  }
 
   const Json* origin = Member(root, "origin");
   if (origin == nullptr || !origin->is_array() || origin->size() != 3) {
@@ -181,6 +186,7 @@ std::string WriteManifest(const MapManifest& manifest) {
       {"schema", kMapSchema},
       {"detector", manifest.detector},
       {"covariance_factor", manifest.covariance_factor},
+      {"covariance_growth", manifest.covariance_growth},
       {"origin", {manifest.origin.x(), manifest.origin.y(), manifest.origin.z()}},
       {"tiles", std::move(tiles)},
   };

@@ -24,7 +24,7 @@ struct TileEntry {
 
 struct MapManifest {
   std::string detector;
-  double covariance_factor = 1.0;
+  double covariance_factor = 1.0, covariance_growth = 0.0;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::array<TileEntry, kNumTileKinds> tiles;  // in the order of TileKind
 };

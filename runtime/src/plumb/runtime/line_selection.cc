@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "plumb/geometry/line_projection.h"
+#include "plumb/runtime/covariance_factor.h"
 
 namespace plumb {
 namespace {
@@ -13,7 +14,7 @@ constexpr double kLengthCapPx = 150.0;
 constexpr double kMinLengthPx = 15.0;
 
 constexpr size_t kMaxSearchLines = 300, kMaxAlignmentLines = 250, kMaxLocalLines = 400;
-constexpr uint32_t kAlignmentKeyFrames = 5, kLocalKeyFrames = 3;
+constexpr uint32_t kAlignmentKeyFrames = 5;
 constexpr size_t kFewLines = 30;
 
 // Margins around the image: lists for a fixed pose need less than those for an uncertain one.

@@ -7,6 +7,7 @@
 #include "plumb/geometry/line_projection.h"
 #include "plumb/refine/uncertainty.h"
 #include "plumb/runtime/acceptance_gate.h"
+#include "plumb/runtime/covariance_factor.h"
 
 namespace plumb {
 namespace {
@@ -105,7 +106,6 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
   const LineEquations terms = AccumulateLines(input.camera, refined, observations_, kRobust);
   const Matrix6d prior_information =
       PriorCovariance(input.prior.rotation_sigma_rad, input.prior.position_sigma_m).inverse();
-  const double factor = index_.map().covariance_factor;
   const PoseSupport prior_support = MeasureSupport(input.camera, prior);
   const GateEvidence evidence{
       .refined = MeasureSupport(input.camera, refined),  // last: projects for the evidence
@@ -122,6 +122,7 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
   result->num_observed_directions = evidence.num_observed_directions;
   if (result->status == RefineStatus::kRefined) {
     result->cam_from_world = refined;
+    const double factor = CovarianceFactorAt(index_, refined, &factor_key_frames_);
     result->covariance = PoseCovariance(terms.equations.information, terms.residual_scale, factor,
                                         prior_information);
     result->num_points_used = static_cast<uint32_t>(points_.size());

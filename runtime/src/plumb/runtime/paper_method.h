@@ -47,6 +47,7 @@ class PaperMethod {
   ProjectedLines projected_;
   SupportMeter support_meter_;
   EvidenceMeter evidence_meter_;
+  std::vector<uint32_t> factor_key_frames_;
   std::vector<uint32_t> key_frames_;
   std::vector<MatchCandidate> candidates_;
   std::vector<LineAssignment> assignments_;

@@ -5,6 +5,7 @@
 
 #include "plumb/base/stopwatch.h"
 #include "plumb/refine/uncertainty.h"
+#include "plumb/runtime/covariance_factor.h"
 
 namespace plumb {
 namespace {
@@ -128,13 +129,12 @@ void SearchMethod::Finish(const RefineInput& input, const PosePrior& prior, Fine
   const Matrix6d information =
       alignment.line_information + alignment.residual_scale * alignment.point_information;
   const Matrix6d prior_information = PriorInformation(prior);
-  const double factor = index_.map().covariance_factor;
+  const double factor = CovarianceFactorAt(index_, alignment.cam_from_world, &key_frames_);
   result->cam_from_world = alignment.cam_from_world;
   result->covariance =
       PoseCovariance(information, alignment.residual_scale, factor, prior_information);
   result->num_observed_directions =
-      Observe(information / (std::max(alignment.residual_scale, kMinScale) * factor),
-              prior_information)
+      Observe(information / std::max(alignment.residual_scale, kMinScale), prior_information)
           .num_observed;
   result->num_points_used = static_cast<uint32_t>(alignment.num_points);
   stages_.covariance_ns = watch.Lap();

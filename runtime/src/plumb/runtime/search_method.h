@@ -92,6 +92,7 @@ class SearchMethod {
   PointTable all_points_, near_points_;
   PointTableAccumulator point_terms_;
   std::vector<uint32_t> near_rows_;
+  std::vector<uint32_t> key_frames_;
   SoftAssociator associator_;
   std::vector<LinePair> pairs_;
   std::vector<int32_t> best_pair_;  // per segment

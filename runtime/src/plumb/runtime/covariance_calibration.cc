@@ -68,9 +68,10 @@ class Calibrator {
     detected_.clear();
     for (const LiftedSegment& segment : frame.segments) detected_.push_back(segment.segment_px);
     segments_.Assign(detected_, kMaxSegments);
+    aligner_.Begin(frame.camera, frame.cam_from_world, lines_, segments_);
     const FineAlignment found =
-        aligner_.Align(frame.camera, frame.cam_from_world, lines_, segments_, LocalSchedule(),
-                       {frame.cam_from_world, 2 * kRotationSigmaRad, 2 * kPositionSigmaM});
+        aligner_.Run(frame.cam_from_world, LocalSchedule(),
+                     {frame.cam_from_world, 2 * kRotationSigmaRad, 2 * kPositionSigmaM});
     if (found.num_pairs < kMinPairs) return std::nullopt;
     const Matrix6d prior =
         PriorCovariance(kRotationSigmaRad, kPositionSigmaM).diagonal().cwiseInverse().asDiagonal();

@@ -22,7 +22,7 @@ inline constexpr size_t kMinCalibrationErrors = 8;
 /// logarithm by least absolute deviations, which a few wrong poses do not bend. Errors of map and
 /// key-frame poses are common to all lines of a frame: its residuals do not show them, other key
 /// frames do. Needs no images and no second map; about half a millisecond an error. Deterministic.
-/// Source: docs/adr/0009-covariance-from-the-maps-own-key-frames.md.
+/// Source: docs/adr/0010-covariance-from-the-maps-own-key-frames.md.
 CovarianceCalibration CalibrateCovariance(const LineMap& map);
 
 }  // namespace plumb

@@ -43,11 +43,13 @@ LineMap Map(int num_key_frames, double step_m, double noise_px, double pose_erro
   return map;
 }
 
-TEST(CovarianceCalibration, IndependentNoiseNeedsNoLargeFactor) {
+// A segment's noise counts once for every key frame whose line it meets, as if it were independent:
+// hence about 2 instead of 1. Maps of real sequences need 17 to 75.
+TEST(CovarianceCalibration, IndependentNoiseNeedsASmallFactor) {
   const CovarianceCalibration calibration = CalibrateCovariance(Map(12, 0.04, 0.5, 0.0));
   EXPECT_GE(calibration.num_errors, 50u);
-  EXPECT_GT(calibration.factor + 0.2 * calibration.growth, 0.1);
-  EXPECT_LT(calibration.factor + 0.2 * calibration.growth, 2.0);
+  EXPECT_GT(calibration.factor + 0.2 * calibration.growth, 0.5);
+  EXPECT_LT(calibration.factor + 0.2 * calibration.growth, 4.0);
 }
 
 TEST(CovarianceCalibration, ErrorsOfKeyFramesRaiseIt) {
@@ -97,7 +99,7 @@ TEST(CovarianceFactor, GrowsWithTheDistanceUpToABound) {
 TEST(CovarianceFactor, DistanceIsTheMeanOfTheKeyFrames) {
   LineMap map;
   map.key_frames.resize(2);
-  map.key_frames[0].cam_from_world = {ExpSo3({0.0, 0.1, 0.0}), {}};
+  map.key_frames[0].cam_from_world = {ExpSo3({0.0, 0.1, 0.0}), Eigen::Vector3d::Zero()};
   map.key_frames[1].cam_from_world = {Eigen::Quaterniond::Identity(), {0.3, 0.0, 0.0}};
   EXPECT_NEAR(MeanDistance(map, std::vector<uint32_t>{0, 1}, Rigid3{}), 0.2, 1e-12);
   EXPECT_EQ(MeanDistance(map, {}, Rigid3{}), 0.0);

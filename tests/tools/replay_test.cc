@@ -135,6 +135,22 @@ TEST_F(Replay, MapExportWritesPlyAndObj) {
   }
 }
 
+TEST_F(Replay, OverlaysCanDoWithoutTheCamerasImage) {
+  size_t bytes[2] = {0, 0};
+  for (const int brightness : {0, 1}) {
+    const std::string out = dir_ / ("run" + std::to_string(brightness));
+    const ProgramRun run =
+        RunPlumbline(ReplayArguments(Priors(), Map()) + " --overlays 1 --overlay-brightness " +
+                     std::to_string(brightness) + " --out " + out);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    for (const std::string& name : Entries(out)) {
+      if (name.ends_with(".png")) bytes[brightness] = ReadAll(out + "/" + name).size();
+    }
+  }
+  EXPECT_GT(bytes[0], 1000u) << "lines and caption";
+  EXPECT_LT(bytes[0], bytes[1] / 2) << "Black compresses, an image does not.";
+}
+
 TEST_F(Replay, RefinesEveryFrameAndSaysHowWell) {
   const std::string out = dir_ / "run";
   const ProgramRun run = RunPlumbline(ReplayArguments(Priors(), Map()) +

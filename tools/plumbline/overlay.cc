@@ -53,11 +53,11 @@ void DrawCaption(const FrameResult& result, size_t num_map_lines, cv::Mat* canva
 
 }  // namespace
 
-cv::Mat DrawOverlay(const cv::Mat& image, const Camera& camera, const MapIndex& index,
-                    const FrameResult& result) {
+cv::Mat DrawOverlay(const cv::Mat& image, double brightness, const Camera& camera,
+                    const MapIndex& index, const FrameResult& result) {
   cv::Mat canvas;
   cv::resize(image, canvas, {}, kScale, kScale, cv::INTER_LINEAR);
-  canvas.convertTo(canvas, -1, 0.7);  // Darker, so that the lines stand out.
+  canvas.convertTo(canvas, -1, brightness);
 
   std::vector<uint32_t> visible;
   index.VisibleLines(camera, result.refined.cam_from_world, VisibilityOptions{}, &visible);

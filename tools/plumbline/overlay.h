@@ -12,7 +12,8 @@ namespace plumb::tools {
 
 /// The image, twice as large, with the map's lines that are visible from the refined pose (blue),
 /// the matched segments (green), the segments without a match (red), and a caption.
-cv::Mat DrawOverlay(const cv::Mat& image, const Camera& camera, const MapIndex& index,
-                    const FrameResult& result);
+/// @param brightness  of the image behind the lines, 0..1; below 1, so that the lines stand out.
+cv::Mat DrawOverlay(const cv::Mat& image, double brightness, const Camera& camera,
+                    const MapIndex& index, const FrameResult& result);
 
 }  // namespace plumb::tools

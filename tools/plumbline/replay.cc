@@ -26,6 +26,7 @@ struct ReplayOptions {
   FrameRunOptions run;
   std::string out;
   uint32_t overlays = 6;
+  double overlay_brightness = 0.7;
   bool json = false;
 
   ReplayOptions() { run.mode = "independent"; }
@@ -41,14 +42,14 @@ bool IsPicked(size_t index, size_t num_frames, size_t count) {
 /// Writes what comes out of the session.
 class ReplayWriter {
  public:
-  ReplayWriter(const FrameRun& run, size_t num_overlays, OutputDirectory* out)
-      : run_(run), num_overlays_(num_overlays), out_(out) {}
+  ReplayWriter(const FrameRun& run, const ReplayOptions& options, OutputDirectory* out)
+      : run_(run), options_(options), out_(out) {}
 
   Outcome Add(size_t index, const FrameResult& result) {
     trajectory_.push_back({result.timestamp_ns, result.refined.cam_from_world});
     frames_jsonl_ += DescribeFrame(result).dump() + "\n";
     statistics_.Add(result);
-    if (!IsPicked(index, run_.frames.size(), num_overlays_)) return std::nullopt;
+    if (!IsPicked(index, run_.frames.size(), options_.overlays)) return std::nullopt;
     return WriteOverlay(index, result);
   }
 
@@ -65,7 +66,8 @@ class ReplayWriter {
   Outcome WriteOverlay(size_t index, const FrameResult& result) {
     const Result<cv::Mat> image = ReadColorImage(run_.frames[index].color_path);
     if (!image) return FailureFrom(image.error());
-    const cv::Mat picture = DrawOverlay(*image, run_.sequence.camera, *run_.index, result);
+    const cv::Mat picture =
+        DrawOverlay(*image, options_.overlay_brightness, run_.sequence.camera, *run_.index, result);
     std::vector<uint8_t> png;
     cv::imencode(".png", picture, png);
     return out_->Write("overlay-" + FormatTimestamp(result.timestamp_ns) + ".png",
@@ -73,7 +75,7 @@ class ReplayWriter {
   }
 
   const FrameRun& run_;
-  size_t num_overlays_;
+  const ReplayOptions& options_;
   OutputDirectory* out_;
   Trajectory trajectory_;
   std::string frames_jsonl_;
@@ -121,7 +123,7 @@ Outcome RunReplay(const ReplayOptions& options) {
   FrameRun run;
   if (Outcome failed = OpenFrameRun(options.run, &run)) return failed;
   if (Outcome failed = out.Open(options.out, "summary.json")) return failed;
-  ReplayWriter writer(run, options.overlays, &out);
+  ReplayWriter writer(run, options, &out);
   {
     ProgressBar progress("replay", run.frames.size());
     const FrameSink sink = [&](size_t index, const FrameResult& result) {
@@ -151,6 +153,12 @@ void AddReplay(CLI::App& program, PendingRun& pending) {
                 "and overlays; an earlier run there is replaced")
             ->required();
         command.add_option("--overlays", options.overlays, "Number of pictures, evenly spaced")
+            ->capture_default_str();
+        command
+            .add_option("--overlay-brightness", options.overlay_brightness,
+                        "Of the camera's image behind the lines: 1 as it is, 0 leaves it out, for "
+                        "pictures that may be shown")
+            ->check(CLI::Range(0.0, 1.0))
             ->capture_default_str();
         command.add_flag("--json", options.json, "Print the summary as JSON");
         command.footer(

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <numbers>
 
 #include "plumb/base/simd_clones.h"
+#include "plumb/matching/overlap_geometry.h"
 
 namespace plumb {
 namespace {
@@ -20,10 +20,6 @@ constexpr float kAngleSlack = 0.005f;
 constexpr float kSineSlack = 0.02f, kShareSlack = 0.1f;
 
 size_t Padded(size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
-
-struct Line {
-  float x, y, direction_x, direction_y, length;
-};
 
 /// Smallest distances first, then overlaps, then shares; all of them exclusive.
 struct Limits {
@@ -40,30 +36,21 @@ Limits LimitsOf(const AssociationGates& gates, float slack_px) {
       std::max(static_cast<float>(gates.min_overlap_share) - (exact ? 0.0f : kShareSlack), 0.0f)};
 }
 
-PLUMB_SIMD_CLONES void InsideKernel(const Line line, const Limits limits, size_t count,
+/// 1 or 0, without branches.
+inline int32_t IsInside(const OverlapGeometry& o, const Limits& limits, float line_length,
+                        float segment_length) {
+  return (o.square < limits.square) & (o.sine < limits.sine) & (o.overlap > limits.overlap) &
+         (o.overlap > limits.share * std::min(line_length, segment_length));
+}
+
+PLUMB_SIMD_CLONES void InsideKernel(const ImageLine line, const Limits limits, size_t count,
                                     const float* __restrict x0, const float* __restrict y0,
                                     const float* __restrict x1, const float* __restrict y1,
                                     const float* __restrict dx, const float* __restrict dy,
                                     const float* __restrict length, int32_t* __restrict inside) {
   for (size_t k = 0; k < count; ++k) {
-    const float ax = x0[k] - line.x, ay = y0[k] - line.y;
-    const float bx = x1[k] - line.x, by = y1[k] - line.y;
-    const float along_a = ax * line.direction_x + ay * line.direction_y;
-    const float along_b = bx * line.direction_x + by * line.direction_y;
-    const float across_a = ay * line.direction_x - ax * line.direction_y;
-    const float across_b = by * line.direction_x - bx * line.direction_y;
-    const float first = std::max(std::min(along_a, along_b), 0.0f);
-    const float last = std::min(std::max(along_a, along_b), line.length);
-    const float extent = along_b - along_a;
-    const float inverse = 1.0f / (std::abs(extent) < 1e-6f ? 1e-6f : extent);
-    const float slope = (across_b - across_a) * inverse;
-    const float h0 = across_a + (first - along_a) * slope;
-    const float h1 = across_a + (last - along_a) * slope;
-    const float sine = std::abs(line.direction_x * dy[k] - line.direction_y * dx[k]);
-    const float overlap = last - first;
-    inside[k] = (0.5f * (h0 * h0 + h1 * h1) < limits.square) & (sine < limits.sine) &
-                (overlap > limits.overlap) &
-                (overlap > limits.share * std::min(line.length, length[k]));
+    const OverlapGeometry o = MeasureOverlap(line, x0[k], y0[k], x1[k], y1[k], dx[k], dy[k]);
+    inside[k] = IsInside(o, limits, line.length, length[k]);
   }
 }
 
@@ -91,32 +78,18 @@ PLUMB_SIMD_CLONES void WeighKernel(const Limits limits, float square_factor, flo
                                    float* __restrict out_square) {
   for (size_t k = 0; k < count; ++k) {
     const int32_t i = row[k];
-    const float lx = line_x[i], ly = line_y[i], ldx = line_dx[i], ldy = line_dy[i];
-    const float whole = line_length[i];
-    const float ax = x0[k] - lx, ay = y0[k] - ly, bx = x1[k] - lx, by = y1[k] - ly;
-    const float along_a = ax * ldx + ay * ldy, along_b = bx * ldx + by * ldy;
-    const float across_a = ay * ldx - ax * ldy, across_b = by * ldx - bx * ldy;
-    const float first = std::max(std::min(along_a, along_b), 0.0f);
-    const float last = std::min(std::max(along_a, along_b), whole);
-    const float extent = along_b - along_a;
-    // Perpendicular segments have no extent; their sine keeps them out of every gate.
-    const float inverse = 1.0f / (std::abs(extent) < 1e-6f ? 1e-6f : extent);
-    const float u0 = (first - along_a) * inverse, u1 = (last - along_a) * inverse;
-    const float h0 = across_a + u0 * (across_b - across_a);
-    const float h1 = across_a + u1 * (across_b - across_a);
-    const float sine = std::abs(ldx * dy[k] - ldy * dx[k]);
-    const float square = 0.5f * (h0 * h0 + h1 * h1), overlap = last - first;
-    const int32_t inside = (square < limits.square) & (sine < limits.sine) &
-                           (overlap > limits.overlap) &
-                           (overlap > limits.share * std::min(whole, length[k]));
+    const ImageLine line{line_x[i], line_y[i], line_dx[i], line_dy[i], line_length[i]};
+    const OverlapGeometry o = MeasureOverlap(line, x0[k], y0[k], x1[k], y1[k], dx[k], dy[k]);
+    const int32_t inside = IsInside(o, limits, line.length, length[k]);
     // Far pairs are clamped, not skipped: the loop has no branch.
-    const float value = Exp(std::max(square_factor * square + sine_factor * sine * sine, -60.0f));
+    const float value =
+        Exp(std::max(square_factor * o.square + sine_factor * o.sine * o.sine, -60.0f));
     // A mask, since a condition would become a branch.
     e[k] = std::bit_cast<float>(std::bit_cast<int32_t>(value) & -inside);
-    out_overlap[k] = overlap;
-    out_begin[k] = u0;
-    out_end[k] = u1;
-    out_square[k] = square;
+    out_overlap[k] = o.overlap;
+    out_begin[k] = o.begin;
+    out_end[k] = o.end;
+    out_square[k] = o.square;
   }
 }
 
@@ -148,8 +121,8 @@ void PairList::Build(const ProjectedLines& lines, const SegmentTable& segments,
   if (inside_.size() < segments.size() + kLanes) inside_.resize(segments.size() + kLanes);
   for (size_t i = 0; i < lines.size() && line_.size() < kMaxPairs; ++i) {
     if (!(lines.length[i] > 0.0f)) continue;
-    const Line line{lines.x[i], lines.y[i], lines.direction_x[i], lines.direction_y[i],
-                    lines.length[i]};
+    const ImageLine line{lines.x[i], lines.y[i], lines.direction_x[i], lines.direction_y[i],
+                         lines.length[i]};
     for (const SegmentTable::Range range : segments.Within(lines.angle[i], half_width)) {
       const size_t b = range.begin, count = range.end - range.begin;
       if (count == 0) continue;

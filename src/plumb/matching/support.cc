@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 
 #include "plumb/base/simd_clones.h"
+#include "plumb/matching/overlap_geometry.h"
 
 namespace plumb {
 namespace {
@@ -16,39 +16,22 @@ constexpr float kMinOverlapPx = 8.0f;
 constexpr float kInverseSquareScale = 1.0f / (2.0f * 2.0f);  // Geman-McClure at 2 px
 constexpr float kLengthCapPx = 150.0f;
 
-struct Line {
-  float x, y, direction_x, direction_y, length, weight;
-};
-
 /// @return the line's best support by one of `count` segments; `best` are the segments' own.
 /// Supports are not negative, so that their bits order as integers do: that maximum vectorises.
-PLUMB_SIMD_CLONES float SupportKernel(const Line line, size_t count, const float* __restrict x0,
-                                      const float* __restrict y0, const float* __restrict x1,
-                                      const float* __restrict y1, const float* __restrict dx,
-                                      const float* __restrict dy, float* __restrict best) {
+PLUMB_SIMD_CLONES float SupportKernel(const ImageLine line, float weight, size_t count,
+                                      const float* __restrict x0, const float* __restrict y0,
+                                      const float* __restrict x1, const float* __restrict y1,
+                                      const float* __restrict dx, const float* __restrict dy,
+                                      float* __restrict best) {
   int32_t line_best = 0;
   for (size_t k = 0; k < count; ++k) {
-    const float ax = x0[k] - line.x, ay = y0[k] - line.y;
-    const float bx = x1[k] - line.x, by = y1[k] - line.y;
-    const float along_a = ax * line.direction_x + ay * line.direction_y;
-    const float along_b = bx * line.direction_x + by * line.direction_y;
-    const float across_a = ay * line.direction_x - ax * line.direction_y;
-    const float across_b = by * line.direction_x - bx * line.direction_y;
-    const float first = std::max(std::min(along_a, along_b), 0.0f);
-    const float last = std::min(std::max(along_a, along_b), line.length);
-    const float extent = along_b - along_a;
-    const float inverse = 1.0f / (std::abs(extent) < 1e-6f ? 1e-6f : extent);
-    const float slope = (across_b - across_a) * inverse;
-    const float h0 = across_a + (first - along_a) * slope;
-    const float h1 = across_a + (last - along_a) * slope;
-    const float sine = std::abs(line.direction_x * dy[k] - line.direction_y * dx[k]);
-    const float overlap = last - first;
-    const float q = 1.0f / (1.0f + 0.5f * (h0 * h0 + h1 * h1) * kInverseSquareScale);
+    const OverlapGeometry o = MeasureOverlap(line, x0[k], y0[k], x1[k], y1[k], dx[k], dy[k]);
+    const float q = 1.0f / (1.0f + o.square * kInverseSquareScale);
     // A mask, since a condition would become a branch.
-    const int32_t counts = (overlap > kMinOverlapPx) & (sine < kMaxSine);
-    const int32_t support = std::bit_cast<int32_t>(overlap * q * q) & -counts;
+    const int32_t counts = (o.overlap > kMinOverlapPx) & (o.sine < kMaxSine);
+    const int32_t support = std::bit_cast<int32_t>(o.overlap * q * q) & -counts;
     line_best = std::max(line_best, support);
-    best[k] = std::max(best[k], std::bit_cast<float>(support) * line.weight);
+    best[k] = std::max(best[k], std::bit_cast<float>(support) * weight);
   }
   return std::bit_cast<float>(line_best);
 }
@@ -60,22 +43,22 @@ PoseSupport SupportMeter::Measure(const ProjectedLines& lines, const SegmentTabl
   double explained = 0.0, visible = 0.0;
   for (size_t i = 0; i < lines.size(); ++i) {
     if (!(lines.length[i] > 0.0f)) continue;
-    const Line line{lines.x[i],           lines.y[i],      lines.direction_x[i],
-                    lines.direction_y[i], lines.length[i], lines.weight[i]};
+    const ImageLine line{lines.x[i], lines.y[i], lines.direction_x[i], lines.direction_y[i],
+                         lines.length[i]};
     float line_best = 0.0f;
     for (const SegmentTable::Range range : segments.Within(lines.angle[i], kHalfWidth)) {
       const size_t b = range.begin, count = range.end - range.begin;
       if (count == 0) continue;
       // Rows after the range are too slanted to count, or padding.
-      line_best =
-          std::max(line_best, SupportKernel(line, (count + kLanes - 1) / kLanes * kLanes,
-                                            segments.x0.data() + b, segments.y0.data() + b,
-                                            segments.x1.data() + b, segments.y1.data() + b,
-                                            segments.direction_x.data() + b,
-                                            segments.direction_y.data() + b, best_.data() + b));
+      line_best = std::max(
+          line_best,
+          SupportKernel(line, lines.weight[i], (count + kLanes - 1) / kLanes * kLanes,
+                        segments.x0.data() + b, segments.y0.data() + b, segments.x1.data() + b,
+                        segments.y1.data() + b, segments.direction_x.data() + b,
+                        segments.direction_y.data() + b, best_.data() + b));
     }
-    explained += static_cast<double>(line.weight) * std::min(line_best, kLengthCapPx);
-    visible += static_cast<double>(line.weight) * std::min(line.length, kLengthCapPx);
+    explained += static_cast<double>(lines.weight[i]) * std::min(line_best, kLengthCapPx);
+    visible += static_cast<double>(lines.weight[i]) * std::min(line.length, kLengthCapPx);
   }
   PoseSupport support;
   for (size_t row = 0; row < segments.size(); ++row) {

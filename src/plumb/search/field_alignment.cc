@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 
 #include "plumb/base/simd_clones.h"
+#include "plumb/base/weighted_products.h"
 #include "plumb/geometry/rigid3.h"
 
 namespace plumb {
@@ -57,36 +58,6 @@ PLUMB_SIMD_CLONES void JacobianKernel(size_t count, float fx, float fy, const Ce
   }
 }
 
-PLUMB_SIMD_CLONES void Multiply(size_t count, const float* __restrict a, const float* __restrict b,
-                                float* __restrict product) {
-  for (size_t k = 0; k < count; ++k) product[k] = a[k] * b[k];
-}
-
-/// Products of one column with the six of the Jacobian and the residuals.
-PLUMB_SIMD_CLONES void Dots(size_t count, const float* __restrict a, const float* __restrict b0,
-                            const float* __restrict b1, const float* __restrict b2,
-                            const float* __restrict b3, const float* __restrict b4,
-                            const float* __restrict b5, const float* __restrict b6,
-                            float* __restrict sums) {
-  float s0 = 0.0f, s1 = 0.0f, s2 = 0.0f, s3 = 0.0f, s4 = 0.0f, s5 = 0.0f, s6 = 0.0f;
-  for (size_t k = 0; k < count; ++k) {
-    s0 += a[k] * b0[k];
-    s1 += a[k] * b1[k];
-    s2 += a[k] * b2[k];
-    s3 += a[k] * b3[k];
-    s4 += a[k] * b4[k];
-    s5 += a[k] * b5[k];
-    s6 += a[k] * b6[k];
-  }
-  sums[0] = s0;
-  sums[1] = s1;
-  sums[2] = s2;
-  sums[3] = s3;
-  sums[4] = s4;
-  sums[5] = s5;
-  sums[6] = s6;
-}
-
 }  // namespace
 
 RelativePose FieldAligner::Align(const Camera& camera, const DirectionField& field,
@@ -132,13 +103,14 @@ RelativePose FieldAligner::Align(const Camera& camera, const DirectionField& fie
                    jacobian_[4].data(), jacobian_[5].data());
     Matrix6d information;
     Vector6d gradient;
+    LeastSquaresColumns columns;
+    for (size_t i = 0; i < 6; ++i) columns[i] = jacobian_[i].data();
+    columns[6] = distance_.data();
+    float sums[6][7];
+    SumWeightedProducts(count, columns, lookups_.weight.data(), weighted_.data(), sums);
     for (int i = 0; i < 6; ++i) {
-      Multiply(count, jacobian_[i].data(), lookups_.weight.data(), weighted_.data());
-      float sums[7];
-      Dots(count, weighted_.data(), jacobian_[0].data(), jacobian_[1].data(), jacobian_[2].data(),
-           jacobian_[3].data(), jacobian_[4].data(), jacobian_[5].data(), distance_.data(), sums);
-      for (int j = i; j < 6; ++j) information(j, i) = static_cast<double>(sums[j]);
-      gradient[i] = static_cast<double>(sums[6]);
+      for (int j = i; j < 6; ++j) information(j, i) = static_cast<double>(sums[i][j]);
+      gradient[i] = static_cast<double>(sums[i][6]);
     }
     const Rigid3 current = pose.After(Rigid3{});
     gradient += prior.cwiseProduct(Difference(current, Rigid3{}));

@@ -1,59 +1,19 @@
 #include "tools/plumbline/refine_queries.h"
 
 #include <algorithm>
-#include <cstdint>
-#include <filesystem>
-#include <map>
 #include <numbers>
 #include <utility>
 
-#include "plumb/base/file.h"
 #include "plumb/features/segment_refiner.h"
 #include "tools/datasets/image_file.h"
+#include "tools/datasets/line_annotations.h"
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/interrupt.h"
-#include "tools/plumbline/json_report.h"
 #include "tools/plumbline/point_front_end.h"
 #include "tools/synth/camera_path.h"
 #include "tools/synth/line_city.h"
 
 namespace plumb::tools {
-namespace {
-
-constexpr size_t kMaxSegmentsFile = size_t{1} << 30;
-
-using SegmentsOfImages = std::map<std::string, std::vector<Segment2>>;  // by file name
-
-Outcome ReadSegments(const std::string& path, SegmentsOfImages* out) {
-  const Result<std::string> text = ReadFile(path, kMaxSegmentsFile);
-  if (!text) return FailureFrom(text.error());
-  const auto bad = [&] {
-    return Failure{kExitBadData, path + ": is not what `plumbline detect --json` prints"};
-  };
-  const Json images = Json::parse(*text, nullptr, false);
-  if (!images.is_array()) return bad();
-  for (const Json& image : images) {
-    if (!image.is_object() || !image.contains("file") || !image["file"].is_string() ||
-        !image.contains("lines") || !image["lines"].is_array()) {
-      return bad();
-    }
-    std::vector<Segment2>& segments =
-        (*out)[std::filesystem::path(image["file"].get<std::string>()).filename().string()];
-    for (const Json& line : image["lines"]) {
-      if (!line.is_array() || line.size() != 4) return bad();
-      double v[4];
-      for (size_t i = 0; i < 4; ++i) {
-        if (!line[i].is_number()) return bad();
-        v[i] = line[i].get<double>();
-      }
-      segments.push_back({{v[0], v[1]}, {v[2], v[3]}});
-    }
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
 RefineQueries MakeCityQueries(const CityQueryOptions& options, LineMap* out_map) {
   const synth::LineCity city({.num_lines = options.num_lines, .seed = options.seed});
   RefineQueries out;
@@ -79,14 +39,18 @@ RefineQueries MakeCityQueries(const CityQueryOptions& options, LineMap* out_map)
 
 Outcome ReadQueries(FrameRun* run, const std::string& segments_path, size_t limit,
                     RefineQueries* out_queries) {
-  SegmentsOfImages known;
+  const size_t count = std::min(limit, run->frames.size());
+  std::vector<std::vector<Segment2>> known;
   if (!segments_path.empty()) {
-    if (Outcome failed = ReadSegments(segments_path, &known)) return failed;
+    std::vector<AnnotatedImage> images(count);
+    for (size_t i = 0; i < count; ++i) images[i].path = run->frames[i].color_path;
+    Result<std::vector<std::vector<Segment2>>> read = ReadDetections(segments_path, images);
+    if (!read) return FailureFrom(read.error());
+    known = *std::move(read);
   }
   out_queries->camera = run->sequence.camera;
   SegmentRefiner refiner{SegmentRefinerOptions{}};
   PointFrontEnd points;
-  const size_t count = std::min(limit, run->frames.size());
   ProgressBar progress("load", count);
   for (size_t i = 0; i < count; ++i) {
     if (Outcome interrupted = CheckInterrupt()) return interrupted;
@@ -110,13 +74,7 @@ Outcome ReadQueries(FrameRun* run, const std::string& segments_path, size_t limi
         query.points = *std::move(matches);
       }
     }
-    if (!segments_path.empty()) {
-      const auto found = known.find(std::filesystem::path(frame.color_path).filename().string());
-      if (found == known.end()) {
-        return Failure{kExitBadData, segments_path + ": has no segments of " + frame.color_path};
-      }
-      query.segments = found->second;
-    }
+    if (!segments_path.empty()) query.segments = std::move(known[i]);
     progress.Advance();
   }
   return std::nullopt;

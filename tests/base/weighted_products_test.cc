@@ -10,7 +10,7 @@ namespace {
 
 TEST(WeightedProducts, AreTheSumsOfThePlainLoop) {
   for (const size_t count : {0u, 1u, 7u, 64u, 101u}) {
-    std::vector<float> column[7], weight(count), scratch(count);
+    std::vector<float> column[7], weight(count);
     LeastSquaresColumns columns;
     for (size_t c = 0; c < 7; ++c) {
       for (size_t k = 0; k < count; ++k) {
@@ -20,9 +20,9 @@ TEST(WeightedProducts, AreTheSumsOfThePlainLoop) {
     }
     for (size_t k = 0; k < count; ++k) weight[k] = static_cast<float>(k % 5);
     float sums[6][7];
-    SumWeightedProducts(count, columns, weight.data(), scratch.data(), sums);
+    SumWeightedProducts(count, columns, weight.data(), sums);
     for (size_t i = 0; i < 6; ++i) {
-      for (size_t j = 0; j < 7; ++j) {
+      for (size_t j = i; j < 7; ++j) {
         double expected = 0.0;
         for (size_t k = 0; k < count; ++k) {
           expected += static_cast<double>(weight[k]) * static_cast<double>(column[i][k]) *

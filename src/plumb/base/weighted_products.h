@@ -1,4 +1,4 @@
-// The sums of a weighted least-squares step, several columns at a time.
+// The sums of a weighted least-squares step, several rows at a time.
 #pragma once
 
 #include <array>
@@ -10,9 +10,9 @@ namespace plumb {
 using LeastSquaresColumns = std::array<const float*, 7>;
 
 /// sums[i][j] = sum over `count` rows of weight x column i x column j, for the six unknowns i and
-/// all seven columns j: J^T W J, and in the last column J^T W r. `scratch` has room for `count`
-/// entries.
+/// the columns j >= i: the upper triangle of J^T W J, and in the last column J^T W r. The sums
+/// below the diagonal are not written.
 void SumWeightedProducts(size_t count, const LeastSquaresColumns& columns, const float* weight,
-                         float* scratch, float sums[6][7]);
+                         float sums[6][7]);
 
 }  // namespace plumb

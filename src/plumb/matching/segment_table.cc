@@ -14,6 +14,11 @@ constexpr float kFarAwayPx = 1e8f;
 
 }  // namespace
 
+size_t SegmentTable::BinOf(float value) {
+  const float bin = value * (static_cast<float>(kBins) / kPi);
+  return bin > 0.0f ? std::min(static_cast<size_t>(bin), kBins - 1) : 0;
+}
+
 void SegmentTable::Assign(std::span<const Segment2> segments) {
   for (std::vector<float>* column :
        {&x0, &y0, &x1, &y1, &direction_x, &direction_y, &length, &angle}) {
@@ -23,12 +28,11 @@ void SegmentTable::Assign(std::span<const Segment2> segments) {
   for (uint32_t i = 0; i < segments.size(); ++i) {
     if (segments[i].Length() > 1e-6) source.push_back(i);
   }
-  angle.resize(segments.size());
-  for (const uint32_t i : source) angle[i] = UndirectedAngle(segments[i].Delta());
+  unsorted_.resize(segments.size());
+  for (const uint32_t i : source) unsorted_[i] = UndirectedAngle(segments[i].Delta());
   std::sort(source.begin(), source.end(), [&](uint32_t a, uint32_t b) {
-    return angle[a] != angle[b] ? angle[a] < angle[b] : a < b;
+    return unsorted_[a] != unsorted_[b] ? unsorted_[a] < unsorted_[b] : a < b;
   });
-  angle.clear();
   for (const uint32_t i : source) {
     const Segment2& segment = segments[i];
     const double pixels = segment.Length();
@@ -40,7 +44,12 @@ void SegmentTable::Assign(std::span<const Segment2> segments) {
     direction_x.push_back(static_cast<float>(direction.x()));
     direction_y.push_back(static_cast<float>(direction.y()));
     length.push_back(static_cast<float>(pixels));
-    angle.push_back(UndirectedAngle(segment.Delta()));
+    angle.push_back(unsorted_[i]);
+  }
+  uint32_t row = 0;
+  for (size_t bin = 0; bin <= kBins; ++bin) {
+    while (row < angle.size() && (bin == kBins || BinOf(angle[row]) < bin)) ++row;
+    bin_begin_[bin] = row;
   }
   for (std::vector<float>* column : {&x0, &y0, &x1, &y1}) {
     column->insert(column->end(), kLanes, kFarAwayPx);
@@ -57,15 +66,14 @@ std::array<SegmentTable::Range, 2> SegmentTable::NearAngle(float around, float m
 
 std::array<SegmentTable::Range, 2> SegmentTable::Within(float around, float half) const {
   const uint32_t count = static_cast<uint32_t>(angle.size());
-  if (half >= 0.5f * kPi) return {Range{0, count}, Range{}};
-  const auto first_at_least = [&](float value) {
-    return static_cast<uint32_t>(std::lower_bound(angle.begin(), angle.end(), value) -
-                                 angle.begin());
-  };
+  // Two ranges of whole bins must not meet on the other side.
+  if (half >= 0.5f * kPi - 2.0f * kPi / kBins) return {Range{0, count}, Range{}};
+  const auto begin = [&](float value) { return bin_begin_[BinOf(value)]; };
+  const auto end = [&](float value) { return bin_begin_[BinOf(value) + 1]; };
   const float low = around - half, high = around + half;
-  if (low < 0.0f) return {Range{0, first_at_least(high)}, Range{first_at_least(low + kPi), count}};
-  if (high > kPi) return {Range{0, first_at_least(high - kPi)}, Range{first_at_least(low), count}};
-  return {Range{first_at_least(low), first_at_least(high)}, Range{}};
+  if (low < 0.0f) return {Range{0, end(high)}, Range{begin(low + kPi), count}};
+  if (high > kPi) return {Range{0, end(high - kPi)}, Range{begin(low), count}};
+  return {Range{begin(low), end(high)}, Range{}};
 }
 
 }  // namespace plumb

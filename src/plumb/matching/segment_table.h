@@ -31,7 +31,8 @@ class SegmentTable {
   /// Rows whose direction makes an angle of at most asin(max_sine) with `angle` (in [0, pi)), as up
   /// to two ranges; the second is empty when the angles do not wrap around.
   std::array<Range, 2> NearAngle(float angle, float max_sine) const;
-  /// The same for a half width in radians; rounding is the caller's.
+  /// The same for a half width in radians; rounding is the caller's. Rows up to pi / 512 beyond it
+  /// may come along, since the table knows where its rows are only so finely.
   std::array<Range, 2> Within(float angle, float half_width_rad) const;
 
   std::vector<uint32_t> source;                 // index into the input
@@ -39,6 +40,13 @@ class SegmentTable {
   std::vector<float> direction_x, direction_y;  // unit
   std::vector<float> length;                    // [px]
   std::vector<float> angle;                     // [0, pi)
+
+ private:
+  static constexpr size_t kBins = 512;  // of the angle
+  static size_t BinOf(float angle);
+
+  std::vector<float> unsorted_;                     // angles in the order of the input
+  std::array<uint32_t, kBins + 1> bin_begin_ = {};  // first row of a bin
 };
 
 }  // namespace plumb

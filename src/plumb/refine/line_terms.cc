@@ -111,7 +111,7 @@ LineEquations LineAccumulator::Accumulate(const Camera& camera, const LineEnds& 
                observations.weight.data(), observations.variance_px2.data(), rows_.weight.data(),
                rows_.weight.data() + count, square_.data(), variance_.data());
   LineEquations out;
-  out.equations = SumRows(rows_, &scratch_);
+  out.equations = SumRows(rows_);
   const double variances = static_cast<double>(Sum(count, variance_.data()));
   if (variances > 0.0) {
     out.residual_scale =

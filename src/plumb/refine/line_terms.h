@@ -42,7 +42,7 @@ class LineAccumulator {
 
  private:
   ResidualRows rows_;
-  std::vector<float> scratch_, square_, variance_;
+  std::vector<float> square_, variance_;
 };
 
 }  // namespace plumb

@@ -1,7 +1,9 @@
 #include "plumb/refine/point_terms.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "plumb/base/simd_clones.h"
@@ -106,6 +108,27 @@ PLUMB_SIMD_CLONES void PointWeightKernel(size_t count, float inverse_scale, floa
   }
 }
 
+PLUMB_SIMD_CLONES int32_t CountBelow(size_t count, int32_t bound, const int32_t* __restrict bits) {
+  int32_t below = 0;
+  for (size_t k = 0; k < count; ++k) below += bits[k] < bound;
+  return below;
+}
+
+/// The element that std::nth_element() puts in the middle. Numbers that are not negative order as
+/// their bits do, so that the answer is found bit by bit, by counting and without a branch that
+/// depends on the numbers.
+float UpperMedian(const std::vector<float>& values, std::vector<int32_t>* bits) {
+  bits->resize(values.size());
+  std::memcpy(bits->data(), values.data(), values.size() * sizeof(float));
+  const auto rank = static_cast<int32_t>(values.size() / 2);
+  int32_t found = 0;
+  for (int bit = 30; bit >= 0; --bit) {
+    const int32_t next = found | (1 << bit);
+    if (CountBelow(bits->size(), next, bits->data()) <= rank) found = next;
+  }
+  return std::bit_cast<float>(found);
+}
+
 }  // namespace
 
 void PointTable::Assign(std::span<const PointObservation> points, const Rigid3& reference) {
@@ -167,23 +190,22 @@ PointAccumulator::Equations PointTableAccumulator::Accumulate(const Camera& came
                                                               const PointTable& points,
                                                               double scale) {
   Evaluate(camera, cam_from_world, points);
-  sorted_.clear();
+  usable_.clear();
   for (const float square : square_) {
-    if (square >= 0.0f) sorted_.push_back(square);
+    if (square >= 0.0f) usable_.push_back(square);
   }
   PointAccumulator::Equations out;
-  if (sorted_.empty()) return out;
+  if (usable_.empty()) return out;
   if (scale <= 0.0) {
-    const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(sorted_.size() / 2);
-    std::nth_element(sorted_.begin(), middle, sorted_.end());
-    scale = std::max(static_cast<double>(*middle) / kMedianOfChiSquare2, kMinPointScale);
+    const auto median = static_cast<double>(UpperMedian(usable_, &bits_));
+    scale = std::max(median / kMedianOfChiSquare2, kMinPointScale);
   }
   const size_t count = points.size();
   PointWeightKernel(count, static_cast<float>(1.0 / scale),
                     static_cast<float>(1.0 / (scale * kPointRobustSigmas * kPointRobustSigmas)),
                     square_.data(), rows_.weight.data(), rows_.weight.data() + count);
-  out.equations = SumRows(rows_, &scratch_);
-  out.num_points = static_cast<int>(sorted_.size());
+  out.equations = SumRows(rows_);
+  out.num_points = static_cast<int>(usable_.size());
   out.scale = scale;
   return out;
 }

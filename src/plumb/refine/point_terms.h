@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -44,7 +45,8 @@ class PointTableAccumulator {
   void Evaluate(const Camera& camera, const Rigid3& cam_from_world, const PointTable& points);
 
   ResidualRows rows_;  // of u, then of v, whitened
-  std::vector<float> square_, plain_square_, sorted_, scratch_;
+  std::vector<float> square_, plain_square_, usable_;
+  std::vector<int32_t> bits_;  // of the usable squares
 };
 
 }  // namespace plumb

@@ -18,7 +18,7 @@ struct ResidualRows {
   void Resize(size_t count);
 };
 
-/// J^T W J and J^T W r of the rows. `scratch` is work space.
-NormalEquations SumRows(const ResidualRows& rows, std::vector<float>* scratch);
+/// J^T W J and J^T W r of the rows.
+NormalEquations SumRows(const ResidualRows& rows);
 
 }  // namespace plumb

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "plumb/base/simd_clones.h"
+
 namespace plumb {
 namespace {
 
@@ -11,32 +13,45 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kRadius = 5.0f * kPi / 180.0f;
 constexpr double kMaxLength = 1.0;  // [m]
 
+float MinCosine() {
+  static const float kMinCosine = std::cos(kRadius);
+  return kMinCosine;
+}
+
+PLUMB_SIMD_CLONES void AddNearKernel(size_t count, float cx, float cy, float cz, float min_cosine,
+                                     float weight, const float* __restrict x,
+                                     const float* __restrict y, const float* __restrict z,
+                                     float* __restrict neighbourhood) {
+  for (size_t k = 0; k < count; ++k) {
+    const float cosine = std::abs(cx * x[k] + cy * y[k] + cz * z[k]);
+    neighbourhood[k] += cosine > min_cosine ? weight : 0.0f;
+  }
+}
+
 }  // namespace
+
+void DirectionClusterer::AddNear(size_t center, float weight) {
+  AddNearKernel(x_.size(), x_[center], y_[center], z_[center], MinCosine(), weight, x_.data(),
+                y_.data(), z_.data(), neighbourhood_.data());
+}
 
 void DirectionClusterer::Cluster(std::span<const SearchLine> lines, size_t max_clusters,
                                  std::vector<DirectionCluster>* out) {
   out->clear();
-  directions_.clear();
-  weights_.clear();
+  for (std::vector<float>* column : {&x_, &y_, &z_, &weights_}) column->clear();
   for (const SearchLine& line : lines) {
     const double length = line.segment_in_world.Length();
     if (!(length > 0.0)) continue;
-    directions_.push_back((line.segment_in_world.Delta() / length).cast<float>());
+    const Eigen::Vector3f direction = (line.segment_in_world.Delta() / length).cast<float>();
+    x_.push_back(direction.x());
+    y_.push_back(direction.y());
+    z_.push_back(direction.z());
     weights_.push_back(static_cast<float>(line.weight * std::min(length, kMaxLength)));
   }
-  const size_t count = directions_.size();
-  const float min_cosine = std::cos(kRadius);
-  const auto is_near = [&](size_t i, size_t j) {
-    return std::abs(directions_[i].dot(directions_[j])) > min_cosine;
-  };
-  neighbourhood_.assign(weights_.begin(), weights_.end());
-  for (size_t i = 0; i < count; ++i) {
-    for (size_t j = i + 1; j < count; ++j) {
-      if (!is_near(i, j)) continue;
-      neighbourhood_[i] += weights_[j];
-      neighbourhood_[j] += weights_[i];
-    }
-  }
+  const size_t count = weights_.size();
+  const auto direction = [&](size_t i) { return Eigen::Vector3f(x_[i], y_[i], z_[i]); };
+  neighbourhood_.assign(count, 0.0f);
+  for (size_t i = 0; i < count; ++i) AddNear(i, weights_[i]);
   taken_.assign(count, 0);
   while (out->size() < max_clusters) {
     size_t best = count;
@@ -44,17 +59,17 @@ void DirectionClusterer::Cluster(std::span<const SearchLine> lines, size_t max_c
       if (!taken_[i] && (best == count || neighbourhood_[i] > neighbourhood_[best])) best = i;
     }
     if (best == count) break;
-    const Eigen::Vector3f center = directions_[best];
+    const Eigen::Vector3f center = direction(best);
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     float weight = 0.0f;
     for (size_t j = 0; j < count; ++j) {
-      if (taken_[j] || !is_near(best, j)) continue;
+      const float cosine = center.dot(direction(j));
+      // A line is near itself, whatever rounding makes of it.
+      if (taken_[j] || !(std::abs(cosine) > MinCosine() || j == best)) continue;
       taken_[j] = 1;
-      sum += (center.dot(directions_[j]) < 0.0f ? -weights_[j] : weights_[j]) * directions_[j];
+      sum += (cosine < 0.0f ? -weights_[j] : weights_[j]) * direction(j);
       weight += weights_[j];
-      for (size_t i = 0; i < count; ++i) {
-        if (is_near(i, j)) neighbourhood_[i] -= weights_[j];
-      }
+      AddNear(j, -weights_[j]);
     }
     out->push_back({sum.normalized(), weight});
   }

@@ -25,7 +25,10 @@ class DirectionClusterer {
                std::vector<DirectionCluster>* out);
 
  private:
-  std::vector<Eigen::Vector3f> directions_;
+  /// Adds `weight` to the neighbourhoods of all lines near line `center`.
+  void AddNear(size_t center, float weight);
+
+  std::vector<float> x_, y_, z_;  // directions
   std::vector<float> weights_;
   std::vector<float> neighbourhood_;  // weight of the lines near each line that are left
   std::vector<uint8_t> taken_;

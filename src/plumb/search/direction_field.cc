@@ -39,8 +39,10 @@ void DirectionField::Assign(int image_width_px, int image_height_px,
     const double angle = std::atan2(delta.y(), delta.x());
     Cell keep;
     for (int c = 0; c < kChannels; ++c) {
-      const double off = angle - (c + 0.5) * std::numbers::pi / kChannels;
-      const double distance = std::abs(std::remainder(off, std::numbers::pi));
+      // Both angles are undirected: the first is within pi of zero, the second in 0..pi.
+      double distance = std::abs(angle - (c + 0.5) * std::numbers::pi / kChannels);
+      distance = distance < std::numbers::pi ? distance : distance - std::numbers::pi;
+      distance = std::min(distance, std::numbers::pi - distance);
       keep[static_cast<size_t>(c)] = distance < options.tolerance_rad ? 0x00 : 0xff;
     }
     Draw(segment, keep);
@@ -56,9 +58,9 @@ void DirectionField::Draw(const Segment2& segment, const Cell& keep) {
   // Written so that NaN draws nothing; far more steps than any image has cells are of no use.
   if (!(extent < 1e5)) return;
   const int steps = std::max(1, static_cast<int>(std::ceil(extent)));
+  const Eigen::Vector2d step = delta / steps;
   for (int k = 0; k <= steps; ++k) {
-    const Eigen::Vector2d point = start + static_cast<double>(k) / steps * delta;
-    const double x = std::floor(point.x() + 0.5), y = std::floor(point.y() + 0.5);
+    const double x = start.x() + k * step.x() + 0.5, y = start.y() + k * step.y() + 0.5;
     if (!(x >= 0.0 && x < width_ && y >= 0.0 && y < height_)) continue;
     uint8_t* const cell = cells_[Index(static_cast<int>(y), static_cast<int>(x))].data();
     Store(Load(cell) & Load(keep.data()), cell);

@@ -65,7 +65,7 @@ RelativePose FieldAligner::Align(const Camera& camera, const DirectionField& fie
                                  const FieldAlignmentOptions& options) {
   const size_t count = samples.padded_size();
   lookups_.Resize(count);
-  for (std::vector<float>* column : {&distance_, &gradient_x_, &gradient_y_, &weighted_}) {
+  for (std::vector<float>* column : {&distance_, &gradient_x_, &gradient_y_}) {
     column->resize(count);
   }
   for (std::vector<float>& column : jacobian_) column.resize(count);
@@ -107,7 +107,7 @@ RelativePose FieldAligner::Align(const Camera& camera, const DirectionField& fie
     for (size_t i = 0; i < 6; ++i) columns[i] = jacobian_[i].data();
     columns[6] = distance_.data();
     float sums[6][7];
-    SumWeightedProducts(count, columns, lookups_.weight.data(), weighted_.data(), sums);
+    SumWeightedProducts(count, columns, lookups_.weight.data(), sums);
     for (int i = 0; i < 6; ++i) {
       for (int j = i; j < 6; ++j) information(j, i) = static_cast<double>(sums[i][j]);
       gradient[i] = static_cast<double>(sums[i][6]);

@@ -30,7 +30,7 @@ class FieldAligner {
 
  private:
   FieldLookups lookups_;
-  std::vector<float> distance_, gradient_x_, gradient_y_, weighted_;
+  std::vector<float> distance_, gradient_x_, gradient_y_;
   std::array<std::vector<float>, 6> jacobian_;
 };
 

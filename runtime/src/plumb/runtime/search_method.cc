@@ -84,7 +84,9 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   const uint32_t num_tried = CountDistinctPoses(prior, input.search ? options_.num_hypotheses : 1);
   Attempt attempt = Try(input, prior, options_.num_hypotheses, num_tried);
   int64_t search_ns = attempt.search_ns;
-  if (input.search && MayWiden(attempt, prior.cam_from_world) && !IsOutOfTime(kWideningShare)) {
+  // Points that decide leave a second search nothing to find.
+  if (input.search && MayWiden(attempt, prior.cam_from_world) && !HoldsByPoints(input) &&
+      !IsOutOfTime(kWideningShare)) {
     PosePrior wide = prior;
     wide.position_sigma_m *= kWideningFactor;
     wide.rotation_sigma_rad *= kWideningFactor;

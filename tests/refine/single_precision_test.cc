@@ -53,6 +53,7 @@ Problem MakeProblem(unsigned seed, int num_lines, int num_points) {
     point.deviation_in_world =
         i % 7 == 0 ? Eigen::Vector3d::Zero()
                    : Eigen::Vector3d(world_from_cam.rotation * (0.01 * unit(rng) * p));
+    point.weight = 0.2 + unit(rng);
     if (i % 6 == 5) point.pixel.x() -= 50.0;
   }
   return out;
@@ -169,6 +170,34 @@ TEST(PointTableAccumulator, FindsThePointsNearTheirPixels) {
   near.AssignRows(table, rows);
   EXPECT_EQ(near.size(), expected.size());
   EXPECT_EQ(near.u[5], table.u[6]);
+}
+
+TEST(PointTable, RowsOfOnePixelShareTheWeightOfOne) {
+  Problem problem = MakeProblem(7, 0, 6);
+  for (const int i : {2, 5}) problem.points[i].pixel = problem.points[0].pixel;
+  problem.points[4].pixel = {problem.points[3].pixel.x(), problem.points[3].pixel.y() + 1.0};
+  PointTable table;
+  table.Assign(problem.points, Start());
+  EXPECT_EQ(table.ShareWeights(), 4u);
+  const std::vector<float> third{1.0f / 3, 1.0f, 1.0f / 3, 1.0f, 1.0f, 1.0f / 3};
+  EXPECT_EQ(table.weight, third);
+
+  // Three observations that share a weight are worth one of full weight.
+  problem.points.resize(1);
+  problem.points[0].weight = 1.0;
+  PointTableAccumulator accumulator;
+  table.Assign(problem.points, Start());
+  const auto one = accumulator.Accumulate(kCamera, Start(), table);
+  problem.points.resize(3, problem.points[0]);
+  table.Assign(problem.points, Start());
+  EXPECT_EQ(table.ShareWeights(), 1u);
+  ExpectNear(accumulator.Accumulate(kCamera, Start(), table).equations, one.equations);
+}
+
+TEST(PointTable, NoRowsHaveNoPixels) {
+  PointTable table;
+  table.Assign({}, Start());
+  EXPECT_EQ(table.ShareWeights(), 0u);
 }
 
 TEST(SinglePrecision, StepsLeadToTheOptimumThatCeresFinds) {

@@ -123,6 +123,18 @@ TEST_F(Replay, PointsNeedAMapWithPoints) {
                 "holds no points");
 }
 
+TEST_F(Replay, PointsAloneRefine) {
+  std::string arguments = ReplayArguments(Priors(), Map());
+  arguments.replace(arguments.find("--model lsd"), 11, "--model none");
+  const ProgramRun run =
+      RunPlumbline(arguments + " --points opencv --overlays 0 --out " + (dir_ / "run"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json summary = json::parse(run.out);
+  EXPECT_EQ(summary["model"], "none");
+  EXPECT_GT(summary["status"]["REFINED"].get<int>(), 0);
+  ExpectFailure(arguments, 64, "needs --points opencv");
+}
+
 TEST_F(Replay, MapExportWritesPlyAndObj) {
   for (const auto& [name, begin] : {std::pair("lines.ply", "ply\n"), std::pair("lines.obj", "")}) {
     const ProgramRun run =

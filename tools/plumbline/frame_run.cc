@@ -52,6 +52,23 @@ Outcome ReadPriors(const FrameRunOptions& options, FrameRun* run) {
   return std::nullopt;
 }
 
+/// Finds nothing: what is left of a run without lines are its points.
+class NoLines final : public LineDetector {
+ public:
+  Status Submit(const ImageView&) override { return Ok(); }
+  Result<std::vector<Segment2>> Collect() override { return std::vector<Segment2>(); }
+  std::string Name() const override { return "none"; }
+};
+
+Outcome ChooseDetector(const FrameRunOptions& options, std::unique_ptr<LineDetector>* out) {
+  if (options.detector.model != "none") return CreateDetector(options.detector, out);
+  if (options.points == "none") {
+    return Failure{kExitUsage, "--model none: needs --points opencv, nothing is left otherwise"};
+  }
+  *out = std::make_unique<NoLines>();
+  return std::nullopt;
+}
+
 Outcome FailFrame(const SequenceFrame& frame, const Error& error) {
   // A broken frame is bad data; the command line itself has been checked before.
   const ExitCode code =
@@ -142,7 +159,8 @@ void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
   command
       .add_option(
           "--points", options.points,
-          "none, or opencv: also SIFT points, matched with those that the map's key frames hold")
+          "none, or opencv: also SIFT points, matched with those that the map's key frames hold; "
+          "points alone with --model none")
       ->check(CLI::IsMember({"none", "opencv"}))
       ->capture_default_str();
 }
@@ -167,10 +185,10 @@ Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
   if (!map) return FailureFrom(map.error());
   out_run->map = *std::move(map);
   out_run->index = std::make_unique<MapIndex>(out_run->map);
-  if (Outcome failed = CreateDetector(options.detector, &out_run->detector)) return failed;
+  if (Outcome failed = ChooseDetector(options, &out_run->detector)) return failed;
   out_run->detector_name = out_run->detector->Name();
   out_run->device = out_run->detector->DeviceName();
-  if (out_run->detector_name != out_run->map.detector) {
+  if (out_run->detector_name != "none" && out_run->detector_name != out_run->map.detector) {
     PrintRemark(options.map + ": was built with " + out_run->map.detector +
                 "'s lines, the queries use " + out_run->detector_name + "'s");
   }

@@ -28,7 +28,7 @@ bool IsFinite(const Segment2& segment) {
 }
 bool IsFinite(const PointObservation& point) {
   return point.pixel.allFinite() && point.point_in_world.allFinite() &&
-         point.deviation_in_world.allFinite();
+         point.deviation_in_world.allFinite() && point.weight >= 0.0 && std::isfinite(point.weight);
 }
 
 bool IsValid(const Camera& camera, const Rigid3& start, const JointSolverOptions& options) {
@@ -194,7 +194,7 @@ std::optional<JointSolution> SolveOverlapCost(const Camera& camera, const Rigid3
     num_points += problem.Add(
         PointReprojectionCost::Create(camera, point.point_in_world, point.pixel,
                                       PointReprojectionCost::FromCovariance(covariance)),
-        new GemanMcClureLoss(options.point_robust), 1.0);
+        new GemanMcClureLoss(options.point_robust), point.weight);
   }
   if (num_lines + num_points == 0) return std::nullopt;
   if (prior) {

@@ -115,6 +115,7 @@ PointAccumulator::Equations PointAccumulator::Accumulate(const Camera& camera,
     const double inverse_depth = 1.0 / x_in_cam.z();
     const double x = x_in_cam.x() * inverse_depth, y = x_in_cam.y() * inverse_depth;
     Residual& r = residuals_.emplace_back();
+    r.weight = point.weight;
     r.error = camera.Project(x_in_cam) - point.pixel;
     r.jacobian << -x * y, 1.0 + x * x, -y, inverse_depth, 0.0, -x * inverse_depth,  //
         -(1.0 + y * y), x * y, x, 0.0, inverse_depth, -y * inverse_depth;
@@ -137,7 +138,7 @@ PointAccumulator::Equations PointAccumulator::Accumulate(const Camera& camera,
   const double scale = std::max(*middle / kMedianOfChiSquare2, kMinPointScale);
   for (const Residual& r : residuals_) {
     const double q = 1.0 + r.square / (scale * kPointRobustSigmas * kPointRobustSigmas);
-    const double weight = 1.0 / (scale * q * q);
+    const double weight = r.weight / (scale * q * q);
     const Eigen::Matrix<double, 6, 2> weighted =
         weight * r.jacobian.transpose() * r.inverse_covariance;
     out.equations.information += weighted * r.jacobian;

@@ -61,6 +61,8 @@ struct PointObservation {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
   /// One standard deviation of the point along the ray that made it, as a vector [m].
   Eigen::Vector3d deviation_in_world = Eigen::Vector3d::Zero();
+  /// Share of one observation that it counts for, >= 0.
+  double weight = 1.0;
 };
 
 /// Point terms: covariance of a residual = 0.7^2 I + j j^T, j the image of the deviation; whitened
@@ -84,7 +86,7 @@ class PointAccumulator {
     Eigen::Vector2d error;
     Eigen::Matrix<double, 2, 6> jacobian;
     Eigen::Matrix2d inverse_covariance;
-    double square;
+    double square, weight;
   };
   std::vector<Residual> residuals_;
   std::vector<double> squares_;

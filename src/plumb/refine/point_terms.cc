@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 #include "plumb/base/simd_clones.h"
 #include "plumb/geometry/line_projection.h"
@@ -98,11 +99,12 @@ PLUMB_SIMD_CLONES void PointKernel(size_t count, const View view, const float* _
 }
 
 PLUMB_SIMD_CLONES void PointWeightKernel(size_t count, float inverse_scale, float inverse_bound,
-                                         const float* __restrict square, float* __restrict weight_u,
+                                         const float* __restrict square,
+                                         const float* __restrict share, float* __restrict weight_u,
                                          float* __restrict weight_v) {
   for (size_t k = 0; k < count; ++k) {
     const float q = 1.0f / (1.0f + std::max(square[k], 0.0f) * inverse_bound);
-    const float weight = square[k] >= 0.0f ? inverse_scale * q * q : 0.0f;
+    const float weight = square[k] >= 0.0f ? inverse_scale * share[k] * q * q : 0.0f;
     weight_u[k] = weight;
     weight_v[k] = weight;
   }
@@ -134,7 +136,7 @@ float UpperMedian(const std::vector<float>& values, std::vector<int32_t>* bits) 
 void PointTable::Assign(std::span<const PointObservation> points, const Rigid3& reference) {
   reference_from_world = reference;
   for (std::vector<float>* column :
-       {&u, &v, &x, &y, &z, &deviation_x, &deviation_y, &deviation_z}) {
+       {&u, &v, &x, &y, &z, &deviation_x, &deviation_y, &deviation_z, &weight}) {
     column->resize(points.size());
   }
   const Eigen::Matrix3d rotation = reference.RotationMatrix();
@@ -150,6 +152,7 @@ void PointTable::Assign(std::span<const PointObservation> points, const Rigid3& 
     deviation_x[i] = d.x();
     deviation_y[i] = d.y();
     deviation_z[i] = d.z();
+    weight[i] = static_cast<float>(points[i].weight);
   }
 }
 
@@ -167,6 +170,21 @@ void PointTable::AssignRows(const PointTable& other, std::span<const uint32_t> k
   copy(other.deviation_x, &deviation_x);
   copy(other.deviation_y, &deviation_y);
   copy(other.deviation_z, &deviation_z);
+  copy(other.weight, &weight);
+}
+
+size_t PointTable::ShareWeights() {
+  order_.resize(size());
+  std::iota(order_.begin(), order_.end(), 0u);
+  std::sort(order_.begin(), order_.end(),
+            [&](uint32_t a, uint32_t b) { return u[a] != u[b] ? u[a] < u[b] : v[a] < v[b]; });
+  size_t num_pixels = 0;
+  for (size_t begin = 0, end = 0; begin < order_.size(); begin = end, ++num_pixels) {
+    const uint32_t first = order_[begin];
+    while (end < order_.size() && u[order_[end]] == u[first] && v[order_[end]] == v[first]) ++end;
+    for (size_t i = begin; i < end; ++i) weight[order_[i]] = 1.0f / static_cast<float>(end - begin);
+  }
+  return num_pixels;
 }
 
 void PointTableAccumulator::Evaluate(const Camera& camera, const Rigid3& cam_from_world,
@@ -203,7 +221,8 @@ PointAccumulator::Equations PointTableAccumulator::Accumulate(const Camera& came
   const size_t count = points.size();
   PointWeightKernel(count, static_cast<float>(1.0 / scale),
                     static_cast<float>(1.0 / (scale * kPointRobustSigmas * kPointRobustSigmas)),
-                    square_.data(), rows_.weight.data(), rows_.weight.data() + count);
+                    square_.data(), points.weight.data(), rows_.weight.data(),
+                    rows_.weight.data() + count);
   out.equations = SumRows(rows_);
   out.num_points = static_cast<int>(usable_.size());
   out.scale = scale;

@@ -20,12 +20,21 @@ struct PointTable {
   /// The rows named by `kept` of another table.
   void AssignRows(const PointTable& other, std::span<const uint32_t> kept);
 
+  /// Lets rows of the same pixel, one image point matched to several key frames, share the weight
+  /// of one: they share its noise, and their map points mostly a bias.
+  /// @return how many different pixels there are.
+  size_t ShareWeights();
+
   size_t size() const { return u.size(); }
 
   Rigid3 reference_from_world;
   std::vector<float> u, v;     // [px]
   std::vector<float> x, y, z;  // [m]
   std::vector<float> deviation_x, deviation_y, deviation_z;
+  std::vector<float> weight;
+
+ private:
+  std::vector<uint32_t> order_;
 };
 
 /// PointAccumulator in single precision over a table. Owns its work space and does not allocate

@@ -309,6 +309,7 @@ void SearchMethod::FinishWithPoints(const RefineInput& input, const PosePriorFac
                         &near_rows_);
   if (near_rows_.size() < kMinPoints) return;
   near_points_.AssignRows(all_points_, near_rows_);
+  near_points_.ShareWeights();
   // The aligner still holds the local lines, if there were enough.
   if (local_lines_.size() < kMinLocalLines) {
     SelectFineLines(input.camera, alignment->cam_from_world);

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "plumb/base/solve6.h"
 #include "plumb/geometry/line_projection.h"
 
 namespace plumb {
@@ -164,10 +164,11 @@ NormalEquations PriorEquations(const PosePriorFactor& prior, const Rigid3& cam_f
 }
 
 std::optional<Vector6d> SolveStep(const NormalEquations& equations, double max_rotation_rad) {
-  const Matrix6d damped = equations.information + kDamping * Matrix6d::Identity();
-  const Eigen::LLT<Matrix6d> cholesky(damped);
-  if (cholesky.info() != Eigen::Success) return std::nullopt;
-  Vector6d step = -cholesky.solve(equations.gradient);
+  Matrix6d damped = equations.information;
+  damped.diagonal().array() += kDamping;
+  const Vector6d descent = -equations.gradient;
+  Vector6d step;
+  if (!SolvePositive6(damped.data(), descent.data(), step.data())) return std::nullopt;
   if (!step.allFinite()) return std::nullopt;
   const double rotation = step.head<3>().norm();
   if (rotation > max_rotation_rad) step *= max_rotation_rad / rotation;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "plumb/geometry/camera.h"
@@ -30,7 +31,8 @@ class FieldAligner {
 
  private:
   FieldLookups lookups_;
-  std::vector<float> distance_, gradient_x_, gradient_y_;
+  std::vector<int32_t> center_, across_, down_;  // bytes of the field and their differences
+  std::vector<float> distance_;
   std::array<std::vector<float>, 6> jacobian_;
 };
 

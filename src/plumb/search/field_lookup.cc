@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "plumb/base/simd_clones.h"
@@ -11,6 +12,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kMinDepth = 0.05f;  // keeps the division finite
+constexpr float kTiny = 1e-20f;     // likewise
 constexpr float kNearDepth = 0.1f;  // nearer samples are not in the image
 
 struct View {
@@ -21,50 +23,76 @@ struct View {
   int32_t width;
 };
 
-PLUMB_SIMD_CLONES void LookUpKernel(const View v, size_t count, const float* __restrict in_x,
-                                    const float* __restrict in_y, const float* __restrict in_z,
-                                    const float* __restrict in_dx, const float* __restrict in_dy,
-                                    const float* __restrict in_dz,
-                                    const float* __restrict in_weight, int32_t* __restrict index,
+// Eight numbers as one register, or two where there is none so wide.
+using Lanes = float __attribute__((vector_size(LineSamples::kLanes * sizeof(float))));
+using Integers = int32_t __attribute__((vector_size(LineSamples::kLanes * sizeof(int32_t))));
+
+struct Columns {
+  const float *x, *y, *z, *step_x, *step_y, *step_z, *weight;
+};
+
+PLUMB_SIMD_CLONES void LookUpKernel(const View v, size_t num_groups, const uint32_t* group_samples,
+                                    const Columns in, int32_t* __restrict index,
                                     float* __restrict weight, float* __restrict out_x,
                                     float* __restrict out_y, float* __restrict inverse_depth) {
   const float r0 = v.r[0], r1 = v.r[1], r2 = v.r[2], r3 = v.r[3], r4 = v.r[4], r5 = v.r[5];
-  const float r6 = v.r[6], r7 = v.r[7], r8 = v.r[8], t0 = v.t[0], t1 = v.t[1], t2 = v.t[2];
-  const float fx = v.fx, fy = v.fy, cell_fx = v.cell_fx, cell_fy = v.cell_fy;
-  const float cell_cx = v.cell_cx, cell_cy = v.cell_cy;
-  const float last_column = v.last_column, last_row = v.last_row;
-  const int32_t width = v.width;
-  for (size_t k = 0; k < count; ++k) {
-    const float px = in_x[k], py = in_y[k], pz = in_z[k];
-    const float depth = r6 * px + r7 * py + r8 * pz + t2;
-    const float inverse = 1.0f / std::max(depth, kMinDepth);
-    const float x = (r0 * px + r1 * py + r2 * pz + t0) * inverse;
-    const float y = (r3 * px + r4 * py + r5 * pz + t1) * inverse;
-    const float dx = in_dx[k], dy = in_dy[k], dz = in_dz[k];
-    const float turned_z = r6 * dx + r7 * dy + r8 * dz;
-    float u = fx * (r0 * dx + r1 * dy + r2 * dz - x * turned_z);
-    float w = fy * (r3 * dx + r4 * dy + r5 * dz - y * turned_z);
-    // Undirected angle of (u, w) in [0, pi], with a quadratic arctangent.
-    u = w < 0.0f ? -u : u;
-    w = std::abs(w);
-    const float magnitude = std::abs(u);
-    const float ratio = std::min(magnitude, w) / std::max(std::max(magnitude, w), 1e-20f);
-    float angle = ratio * (0.25f * kPi + 0.273f - 0.273f * ratio);
+  const float r6 = v.r[6], r7 = v.r[7], r8 = v.r[8];
+  const Lanes zero = {};
+  for (size_t group = 0; group < num_groups; ++group) {
+    const size_t line = group * LineSamples::kLanes;
+    Lanes px, py, pz, dx, dy, dz, line_weight;
+    std::memcpy(&px, in.x + line, sizeof(px));
+    std::memcpy(&py, in.y + line, sizeof(py));
+    std::memcpy(&pz, in.z + line, sizeof(pz));
+    std::memcpy(&dx, in.step_x + line, sizeof(dx));
+    std::memcpy(&dy, in.step_y + line, sizeof(dy));
+    std::memcpy(&dz, in.step_z + line, sizeof(dz));
+    std::memcpy(&line_weight, in.weight + line, sizeof(line_weight));
+    Lanes ax = r0 * px + r1 * py + r2 * pz + v.t[0];
+    Lanes ay = r3 * px + r4 * py + r5 * pz + v.t[1];
+    Lanes az = r6 * px + r7 * py + r8 * pz + v.t[2];
+    const Lanes sx = r0 * dx + r1 * dy + r2 * dz;
+    const Lanes sy = r3 * dx + r4 * dy + r5 * dz;
+    const Lanes sz = r6 * dx + r7 * dy + r8 * dz;
+    // The image of a straight line is straight: one direction for all of its samples. Undirected
+    // angle of (u, w) in [0, pi], with a quadratic arctangent.
+    Lanes u = v.fx * (sx * az - ax * sz);
+    Lanes w = v.fy * (sy * az - ay * sz);
+    u = w < zero ? -u : u;
+    w = w < zero ? -w : w;
+    const Lanes magnitude = u < zero ? -u : u;
+    const Lanes lower = magnitude < w ? magnitude : w, upper = magnitude < w ? w : magnitude;
+    const Lanes ratio = lower / (upper > kTiny ? upper : zero + kTiny);
+    Lanes angle = ratio * (0.25f * kPi + 0.273f - 0.273f * ratio);
     angle = magnitude < w ? 0.5f * kPi - angle : angle;
-    angle = u < 0.0f ? kPi - angle : angle;
-    const int32_t channel = static_cast<int32_t>(angle * (DirectionField::kChannels / kPi)) &
-                            (DirectionField::kChannels - 1);
-
-    const float column = cell_fx * x + cell_cx, row = cell_fy * y + cell_cy;
-    const bool inside = (depth > kNearDepth) & (column >= 1.0f) & (column < last_column) &
-                        (row >= 1.0f) & (row < last_row);
-    const int32_t c = static_cast<int32_t>(inside ? column : 1.0f);
-    const int32_t r = static_cast<int32_t>(inside ? row : 1.0f);
-    index[k] = (r * width + c) * DirectionField::kChannels + channel;
-    weight[k] = inside ? in_weight[k] : 0.0f;
-    out_x[k] = x;
-    out_y[k] = y;
-    inverse_depth[k] = inverse;
+    angle = u < zero ? kPi - angle : angle;
+    const Integers channel =
+        __builtin_convertvector(angle * (DirectionField::kChannels / kPi), Integers) &
+        (DirectionField::kChannels - 1);
+    for (uint32_t k = group_samples[group]; k > 0; --k) {
+      const Lanes inverse = 1.0f / (az > kMinDepth ? az : zero + kMinDepth);
+      const Lanes x = ax * inverse, y = ay * inverse;
+      const Lanes column = v.cell_fx * x + v.cell_cx, row = v.cell_fy * y + v.cell_cy;
+      const Integers inside = (az > kNearDepth) & (column >= 1.0f) & (column < v.last_column) &
+                              (row >= 1.0f) & (row < v.last_row);
+      const Integers c = __builtin_convertvector(inside ? column : zero + 1.0f, Integers);
+      const Integers r = __builtin_convertvector(inside ? row : zero + 1.0f, Integers);
+      const Integers at = (r * v.width + c) * DirectionField::kChannels + channel;
+      const Lanes counts = inside ? line_weight : zero;
+      std::memcpy(index, &at, sizeof(at));
+      std::memcpy(weight, &counts, sizeof(counts));
+      std::memcpy(out_x, &x, sizeof(x));
+      std::memcpy(out_y, &y, sizeof(y));
+      std::memcpy(inverse_depth, &inverse, sizeof(inverse));
+      index += LineSamples::kLanes;
+      weight += LineSamples::kLanes;
+      out_x += LineSamples::kLanes;
+      out_y += LineSamples::kLanes;
+      inverse_depth += LineSamples::kLanes;
+      ax += sx;
+      ay += sy;
+      az += sz;
+    }
   }
 }
 
@@ -96,10 +124,13 @@ void LookUp(const Camera& camera, const DirectionField& field, const RelativePos
   view.last_column = static_cast<float>(field.width() - 1);
   view.last_row = static_cast<float>(field.height() - 1);
   view.width = field.width();
-  LookUpKernel(view, samples.padded_size(), samples.x.data(), samples.y.data(), samples.z.data(),
-               samples.direction_x.data(), samples.direction_y.data(), samples.direction_z.data(),
-               samples.weight.data(), out->index.data(), out->weight.data(), out->x.data(),
-               out->y.data(), out->inverse_depth.data());
+  out->Resize(samples.num_slots);
+  const LineSamples::Columns& in = samples.columns;
+  LookUpKernel(view, samples.group_samples.size(), samples.group_samples.data(),
+               {in.x.data(), in.y.data(), in.z.data(), in.step_x.data(), in.step_y.data(),
+                in.step_z.data(), in.weight.data()},
+               out->index.data(), out->weight.data(), out->x.data(), out->y.data(),
+               out->inverse_depth.data());
 }
 
 }  // namespace plumb

@@ -22,7 +22,7 @@ struct RelativePose {
   Rigid3 After(const Rigid3& reference_from_world) const;
 };
 
-/// One entry a sample, padding included.
+/// One entry a slot of the samples.
 struct FieldLookups {
   std::vector<int32_t> index;        // byte in the field, always with neighbours on all sides
   std::vector<float> weight;         // of the sample; 0 outside the field or behind the camera
@@ -30,10 +30,10 @@ struct FieldLookups {
   std::vector<float> inverse_depth;  // [1/m], depth taken as at least 0.05 m
 
   void Resize(size_t count);
+  size_t size() const { return index.size(); }
 };
 
-/// Projects the samples and their directions. Directions choose the channel by their image, exact
-/// to 0.004 rad. `out` must have the samples' padded size.
+/// Projects the samples; the image of a line's direction, exact to 0.004 rad, chooses the channel.
 void LookUp(const Camera& camera, const DirectionField& field, const RelativePose& pose,
             const LineSamples& samples, FieldLookups* out);
 

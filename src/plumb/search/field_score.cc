@@ -13,9 +13,8 @@ void FieldScorer::Prepare(const Camera& camera, const DirectionField& field, dou
 }
 
 float FieldScorer::Score(const RelativePose& pose, const LineSamples& samples) {
-  const size_t count = samples.padded_size();
-  lookups_.Resize(count);
   LookUp(camera_, *field_, pose, samples, &lookups_);
+  const size_t count = lookups_.size();
   const uint8_t* const bytes = field_->data();
   const int32_t* const index = lookups_.index.data();
   const float* const weight = lookups_.weight.data();

@@ -1,7 +1,6 @@
 #include "plumb/search/line_samples.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "plumb/geometry/line_projection.h"
@@ -10,25 +9,42 @@ namespace plumb {
 namespace {
 
 constexpr double kStepPx = 40.0;
-constexpr int kMaxSamplesPerLine = 4;
 // A prior that is a little off must not lose the lines at the border.
 constexpr double kMarginPx = 100.0;
 
-std::array<std::vector<float>*, 7> ColumnsOf(LineSamples* samples) {
-  return {&samples->x,           &samples->y,           &samples->z,     &samples->direction_x,
-          &samples->direction_y, &samples->direction_z, &samples->weight};
-}
-
-/// Scales the weights and pads.
+/// Scales the weights and puts the lines into groups.
 void Finish(double total_weight, LineSamples* samples) {
-  samples->count = samples->weight.size();
-  if (total_weight > 0.0) {
-    for (float& weight : samples->weight) weight /= static_cast<float>(total_weight);
+  samples->count = 0;
+  LineSamples::Columns& to = samples->columns;
+  for (std::vector<float>* column :
+       {&to.x, &to.y, &to.z, &to.step_x, &to.step_y, &to.step_z, &to.weight}) {
+    column->clear();
   }
-  constexpr float kPadding[] = {0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.0f, 0.0f};
-  const std::array<std::vector<float>*, 7> columns = ColumnsOf(samples);
-  while (samples->weight.size() % LineSamples::kLanes != 0) {
-    for (size_t c = 0; c < columns.size(); ++c) columns[c]->push_back(kPadding[c]);
+  samples->group_samples.clear();
+  samples->num_slots = 0;
+  const auto append = [&](const SampledLine& line) {
+    to.x.push_back(line.first.x());
+    to.y.push_back(line.first.y());
+    to.z.push_back(line.first.z());
+    to.step_x.push_back(line.step.x());
+    to.step_y.push_back(line.step.y());
+    to.step_z.push_back(line.step.z());
+    to.weight.push_back(line.weight);
+  };
+  const float scale = total_weight > 0.0 ? static_cast<float>(1.0 / total_weight) : 1.0f;
+  for (SampledLine& line : samples->lines) {
+    line.weight *= scale;
+    samples->count += line.num_samples;
+  }
+  for (uint32_t num = 1; num <= LineSamples::kMaxSamples; ++num) {
+    for (const SampledLine& line : samples->lines) {
+      if (line.num_samples == num) append(line);
+    }
+    while (to.weight.size() % LineSamples::kLanes != 0) append(SampledLine{});
+    while (samples->group_samples.size() * LineSamples::kLanes < to.weight.size()) {
+      samples->group_samples.push_back(num);
+      samples->num_slots += num * LineSamples::kLanes;
+    }
   }
 }
 
@@ -36,42 +52,42 @@ void Finish(double total_weight, LineSamples* samples) {
 
 void SampleLines(const Camera& camera, const Rigid3& cam_from_world,
                  std::span<const SearchLine> lines, LineSamples* out) {
-  const std::array<std::vector<float>*, 7> columns = ColumnsOf(out);
-  for (std::vector<float>* column : columns) column->clear();
+  out->lines.clear();
   double total = 0.0;
+  const Eigen::Matrix3d rotation = cam_from_world.RotationMatrix();
+  const Eigen::Vector3d& translation = cam_from_world.translation;
   for (const SearchLine& line : lines) {
-    const Segment3 segment{cam_from_world * line.segment_in_world.start,
-                           cam_from_world * line.segment_in_world.end};
+    const Segment3 segment{rotation * line.segment_in_world.start + translation,
+                           rotation * line.segment_in_world.end + translation};
     const auto image = ProjectSegmentInCam(camera, segment, kMarginPx);
     if (!image) continue;
     const double length = image->Length();
-    const int samples =
-        std::clamp(static_cast<int>(std::lround(length / kStepPx)), 1, kMaxSamplesPerLine);
-    const Eigen::Vector3d delta = segment.Delta();
-    const Eigen::Vector3f direction = delta.normalized().cast<float>();
-    const double weight = line.weight * std::min(length, kStepPx * kMaxSamplesPerLine) / samples;
-    for (int k = 0; k < samples; ++k) {
-      const Eigen::Vector3f point =
-          (segment.start + (k + 0.5) / samples * delta).template cast<float>();
-      const float values[] = {point.x(),     point.y(),     point.z(),    direction.x(),
-                              direction.y(), direction.z(), float(weight)};
-      for (size_t c = 0; c < 7; ++c) columns[c]->push_back(values[c]);
-      total += weight;
-    }
+    constexpr int kMax = LineSamples::kMaxSamples;
+    const int samples = std::clamp(static_cast<int>(std::lround(length / kStepPx)), 1, kMax);
+    const Eigen::Vector3d step = segment.Delta() / samples;
+    const double weight = line.weight * std::min(length, kStepPx * kMax);
+    out->lines.push_back({.first = (segment.start + 0.5 * step).cast<float>(),
+                          .step = step.cast<float>(),
+                          .weight = static_cast<float>(weight / samples),
+                          .num_samples = static_cast<uint32_t>(samples)});
+    total += weight;
   }
   Finish(total, out);
 }
 
 void TakeEvery(const LineSamples& samples, size_t stride, LineSamples* out) {
-  const std::array<const std::vector<float>*, 7> in = {
-      &samples.x,           &samples.y,           &samples.z,     &samples.direction_x,
-      &samples.direction_y, &samples.direction_z, &samples.weight};
-  const std::array<std::vector<float>*, 7> columns = ColumnsOf(out);
-  for (std::vector<float>* column : columns) column->clear();
+  out->lines.clear();
   double total = 0.0;
-  for (size_t k = stride / 2; k < samples.count; k += stride) {
-    for (size_t c = 0; c < columns.size(); ++c) columns[c]->push_back((*in[c])[k]);
-    total += static_cast<double>(samples.weight[k]);
+  size_t k = 0, next = stride / 2;
+  for (const SampledLine& line : samples.lines) {
+    for (uint32_t i = 0; i < line.num_samples; ++i, ++k) {
+      if (k != next) continue;
+      next += stride;
+      const Eigen::Vector3f point = line.first + static_cast<float>(i) * line.step;
+      out->lines.push_back(
+          {.first = point, .step = line.step, .weight = line.weight, .num_samples = 1});
+      total += static_cast<double>(line.weight);
+    }
   }
   Finish(total, out);
 }

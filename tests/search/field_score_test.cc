@@ -41,6 +41,28 @@ struct View {
   }
 };
 
+struct Sample {
+  Eigen::Vector3d point, direction;
+  double weight;
+};
+
+/// Every slot of the groups, padding included.
+std::vector<Sample> SlotsOf(const LineSamples& samples) {
+  std::vector<Sample> slots;
+  const LineSamples::Columns& c = samples.columns;
+  for (size_t group = 0; group < samples.group_samples.size(); ++group) {
+    for (uint32_t k = 0; k < samples.group_samples[group]; ++k) {
+      for (size_t lane = 0; lane < LineSamples::kLanes; ++lane) {
+        const size_t i = group * LineSamples::kLanes + lane;
+        const Eigen::Vector3d step(c.step_x[i], c.step_y[i], c.step_z[i]);
+        slots.push_back({Eigen::Vector3d(c.x[i], c.y[i], c.z[i]) + k * step, step.normalized(),
+                         static_cast<double>(c.weight[i])});
+      }
+    }
+  }
+  return slots;
+}
+
 RelativePose Moved(const Eigen::Vector3d& w, const Eigen::Vector3d& v) {
   return {ExpSo3(w).toRotationMatrix().cast<float>(), v.cast<float>()};
 }
@@ -48,17 +70,15 @@ RelativePose Moved(const Eigen::Vector3d& w, const Eigen::Vector3d& v) {
 TEST(LineSamples, AreOnTheirLinesWithWeightsOfOne) {
   View view;
   ASSERT_GT(view.samples.count, 50u);
-  EXPECT_EQ(view.samples.padded_size() % LineSamples::kLanes, 0u);
+  const std::vector<Sample> slots = SlotsOf(view.samples);
+  EXPECT_EQ(slots.size(), view.samples.num_slots);
   double sum = 0.0;
-  for (size_t k = 0; k < view.samples.padded_size(); ++k) {
-    sum += view.samples.weight[k];
-    if (k >= view.samples.count) {
-      EXPECT_EQ(view.samples.weight[k], 0.0f);
-      continue;
-    }
-    const Eigen::Vector3d x =
-        view.pose.Inverse() *
-        Eigen::Vector3d(view.samples.x[k], view.samples.y[k], view.samples.z[k]);
+  size_t count = 0;
+  for (const Sample& sample : slots) {
+    if (sample.weight == 0.0) continue;  // padding
+    ++count;
+    sum += sample.weight;
+    const Eigen::Vector3d x = view.pose.Inverse() * sample.point;
     double nearest = 1.0;
     for (const SearchLine& line : view.lines) {
       const Eigen::Vector3d d = line.segment_in_world.Delta().normalized();
@@ -66,6 +86,7 @@ TEST(LineSamples, AreOnTheirLinesWithWeightsOfOne) {
     }
     EXPECT_LT(nearest, 1e-5);
   }
+  EXPECT_EQ(count, view.samples.count);
   EXPECT_NEAR(sum, 1.0, 1e-5);
 }
 
@@ -77,6 +98,24 @@ TEST(LineSamples, LongLinesGetMoreSamples) {
   LineSamples samples;
   SampleLines(camera, Rigid3{}, lines, &samples);
   EXPECT_EQ(samples.count, 5u);
+}
+
+TEST(LineSamples, EveryEighthHasLikeWeightsAndPlaces) {
+  View view;
+  LineSamples few;
+  TakeEvery(view.samples, 8, &few);
+  EXPECT_EQ(few.count, (view.samples.count + 3) / 8);
+  double sum = 0.0;
+  for (const Sample& sample : SlotsOf(few)) {
+    if (sample.weight == 0.0) continue;
+    sum += sample.weight;
+    double nearest = 1.0;
+    for (const Sample& other : SlotsOf(view.samples)) {
+      if (other.weight > 0.0) nearest = std::min(nearest, (other.point - sample.point).norm());
+    }
+    EXPECT_LT(nearest, 1e-6);
+  }
+  EXPECT_NEAR(sum, 1.0, 1e-5);
 }
 
 TEST(FieldScore, IsHighAtTheTruth) {
@@ -106,16 +145,11 @@ TEST(FieldScore, EqualsItsDefinition) {
   const RelativePose at = Moved({0.01, -0.02, 0.015}, {0.03, -0.02, 0.05});
   const double sigma = 6.0;
   double support = 0.0, inside = 0.0, total = 0.0;
-  for (size_t k = 0; k < view.samples.count; ++k) {
-    const Eigen::Vector3d x =
-        at.rotation.cast<double>() *
-            Eigen::Vector3d(view.samples.x[k], view.samples.y[k], view.samples.z[k]) +
-        at.translation.cast<double>();
-    const Eigen::Vector3d d =
-        at.rotation.cast<double>() * Eigen::Vector3d(view.samples.direction_x[k],
-                                                     view.samples.direction_y[k],
-                                                     view.samples.direction_z[k]);
-    total += view.samples.weight[k];
+  for (const Sample& sample : SlotsOf(view.samples)) {
+    const Eigen::Matrix3d rotation = at.rotation.cast<double>();
+    const Eigen::Vector3d x = rotation * sample.point + at.translation.cast<double>();
+    const Eigen::Vector3d d = rotation * sample.direction;
+    total += sample.weight;
     if (x.z() <= 0.1) continue;
     const Eigen::Vector2d pixel = view.camera.Project(x);
     const double column = std::floor(pixel.x() / 2 + view.field.border_cells() + 0.5);
@@ -129,8 +163,8 @@ TEST(FieldScore, EqualsItsDefinition) {
     const int channel = static_cast<int>(angle / std::numbers::pi * 16) % 16;
     const double r =
         view.field.At(static_cast<int>(row), static_cast<int>(column), channel) / sigma;
-    inside += view.samples.weight[k];
-    support += view.samples.weight[k] / ((1 + r * r) * (1 + r * r));
+    inside += sample.weight;
+    support += sample.weight / ((1 + r * r) * (1 + r * r));
   }
   // The quick arctangent moves a few samples to the next channel.
   EXPECT_NEAR(view.Score(at, sigma), support / (0.8 * inside + 0.2 * total), 0.02);

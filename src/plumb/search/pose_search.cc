@@ -15,20 +15,25 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 // Pixel constants below hold for images of about this size.
 constexpr int kMaxSearchWidthPx = 960, kReducedWidthPx = 640;
 
-constexpr DirectionFieldOptions kScoringField{.cell_px = 4, .tolerance_rad = 15.0 * kDegree};
-constexpr DirectionFieldOptions kAlignmentField{.cell_px = 4, .tolerance_rad = 10.0 * kDegree};
+constexpr DirectionFieldOptions kField{.cell_px = 4, .tolerance_rad = 10.0 * kDegree};
 constexpr double kScoringSigmaPx = 20.0;
 // First pass: every so manieth sample; so small a share of the hypotheses enters the second.
 constexpr size_t kFewStride = 8, kSecondPassDivisor = 12, kMinSecondPass = 96;
 constexpr size_t kScoredAtOnce = 64;  // between two looks at the clock
 
+// The alignment: so many steps at each sigma, then the best are kept. Wide sigmas are served by
+// every second sample.
 struct Level {
   double sigma_px;
   int num_steps;
+  size_t num_kept;
+  bool all_samples;
 };
-constexpr Level kLevels[] = {{30.0, 3}, {20.0, 3}, {12.0, 3}, {6.0, 3}, {3.0, 2}};
-constexpr size_t kLateLevel = 2;   // where hypotheses enter that skip the widest sigmas
-constexpr size_t kMinAligned = 8;  // never fewer at a level
+constexpr Level kLevels[] = {{30.0, 3, 12, false}, {20.0, 3, 8, false}, {12.0, 2, 28, false},
+                             {12.0, 2, 18, false}, {6.0, 3, 10, true},  {3.0, 2, 8, true}};
+constexpr size_t kNumFirst = 20;   // hypotheses at the first level
+constexpr size_t kLateLevel = 2;   // where all enter, past the widest sigmas
+constexpr size_t kMinAligned = 8;  // so few are not ranked
 // Aligned poses nearer than this are one.
 constexpr float kDuplicatePositionM = 0.01f, kDuplicateRotationRad = 0.005f;
 constexpr double kFinalSigmaPx = 3.0;
@@ -85,7 +90,7 @@ std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const Search
 
   DrawHypotheses(region, lines, options, seed);
   times_.draw_ns = watch.Lap();
-  coarse_field_.Assign(camera_.width_px, camera_.height_px, segments_, kScoringField);
+  field_.Assign(camera_.width_px, camera_.height_px, segments_, kField);
   times_.field_ns = watch.Lap();
   RankAllInTwoPasses(options);
   // The prior itself always takes part.
@@ -100,8 +105,6 @@ std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const Search
     hypotheses_.resize(kept);
   }
   times_.score_ns = watch.Lap();
-  fine_field_.Assign(camera_.width_px, camera_.height_px, segments_, kAlignmentField);
-  times_.field_ns += watch.Lap();
   Align(region, options);
   CollectSurvivors(region, options.num_survivors);
   times_.align_ns = watch.Lap();
@@ -152,7 +155,7 @@ void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
       std::max({kMinSecondPass, options.num_aligned, hypotheses_.size() / kSecondPassDivisor});
   if (num_second < hypotheses_.size()) {
     TakeEvery(samples_, kFewStride, &few_samples_);
-    scorer_.Prepare(camera_, coarse_field_, kScoringSigmaPx);
+    scorer_.Prepare(camera_, field_, kScoringSigmaPx);
     size_t num_scored = 0;
     while (num_scored < hypotheses_.size()) {
       // Draws from the prior come first, each of them from all of the region.
@@ -172,11 +175,11 @@ void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
       hypotheses_.resize(num_second);
     }
   }
-  Rank(kScoringSigmaPx, coarse_field_, samples_);
+  Rank(kScoringSigmaPx, samples_);
 }
 
-void PoseSearch::Rank(double sigma_px, const DirectionField& field, const LineSamples& samples) {
-  scorer_.Prepare(camera_, field, sigma_px);
+void PoseSearch::Rank(double sigma_px, const LineSamples& samples) {
+  scorer_.Prepare(camera_, field_, sigma_px);
   for (Hypothesis& h : hypotheses_) h.score = scorer_.Score(h.pose, samples);
   Sort();
 }
@@ -184,25 +187,27 @@ void PoseSearch::Rank(double sigma_px, const DirectionField& field, const LineSa
 void PoseSearch::Sort() { std::sort(hypotheses_.begin(), hypotheses_.end(), kIsBetter); }
 
 void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& options) {
+  TakeEvery(samples_, 2, &half_samples_);
   late_ = hypotheses_;
+  hypotheses_.resize(std::min(hypotheses_.size(), kNumFirst));
   for (size_t i = 0; i < std::size(kLevels); ++i) {
     // The late ones enter in any case: better a few levels of all than all of a few.
     if (i > kLateLevel && options.deadline.HasPassed(options.align_share)) return;
     const Level& level = kLevels[i];
     if (i == kLateLevel) hypotheses_.insert(hypotheses_.end(), late_.begin(), late_.end());
+    const LineSamples& samples = level.all_samples ? samples_ : half_samples_;
     const FieldAlignmentOptions alignment{
         .sigma_px = level.sigma_px,
         .num_steps = level.num_steps,
         .prior_rotation_sigma_rad = kPriorScale * region.rotation_sigma_rad,
         .prior_position_sigma_m = kPriorScale * region.position_sigma_m};
     for (Hypothesis& h : hypotheses_) {
-      h.pose = aligner_.Align(camera_, fine_field_, samples_, h.pose, alignment);
+      h.pose = aligner_.Align(camera_, field_, samples, h.pose, alignment);
     }
     if (hypotheses_.size() <= kMinAligned) continue;
-    Rank(level.sigma_px, fine_field_, samples_);
-    const size_t kept = std::max(kMinAligned, hypotheses_.size() / 2);
+    Rank(level.sigma_px, samples);
     DropDuplicates();
-    if (hypotheses_.size() > kept) hypotheses_.resize(kept);
+    if (hypotheses_.size() > level.num_kept) hypotheses_.resize(level.num_kept);
   }
 }
 
@@ -223,7 +228,7 @@ void PoseSearch::DropDuplicates() {
 }
 
 void PoseSearch::CollectSurvivors(const SearchRegion& region, size_t max_survivors) {
-  Rank(kFinalSigmaPx, fine_field_, samples_);
+  Rank(kFinalSigmaPx, samples_);
   for (const Hypothesis& h : hypotheses_) {
     if (found_.size() == max_survivors) return;
     const Rigid3 pose = h.pose.After(region.cam_from_world);

@@ -51,11 +51,11 @@ struct FoundPose {
 
 /// Hypotheses from the prior (half of them with the rotation found first), scored on a direction
 /// field of quarter resolution: all of them by an eighth of the samples, the better ones by all.
-/// The best are aligned on a second field, of less tolerant orientations, while sigma shrinks from
-/// 30 to 3 px, and once more from 12 px only: at 30 px most starts run into one optimum, which need
-/// not be the right one. At each level duplicates and the worse half are dropped. Images wider than
-/// 960 px are searched as if 640 px wide. Equal inputs and seeds give equal results. Owns its work
-/// space, does not allocate once warm; not thread-safe. Source: docs/method/association.md.
+/// The best are aligned on the same field while sigma shrinks from 30 to 3 px, and once more from
+/// 12 px only: at 30 px most starts run into one optimum, which need not be the right one. At each
+/// level duplicates and the worse ones are dropped. Images wider than 960 px are searched as if
+/// 640 px wide. Equal inputs and seeds give equal results. Owns its work space, does not allocate
+/// once warm; not thread-safe. Source: docs/method/association.md.
 class PoseSearch {
  public:
   /// @return up to num_survivors poses, best first, any two more than 2 cm or 0.01 rad apart; valid
@@ -77,7 +77,7 @@ class PoseSearch {
 
   void DrawHypotheses(const SearchRegion& region, std::span<const SearchLine> lines,
                       const PoseSearchOptions& options, uint64_t seed);
-  void Rank(double sigma_px, const DirectionField& field, const LineSamples& samples);
+  void Rank(double sigma_px, const LineSamples& samples);
   void Sort();  // best first
   /// Keeps the best by a few samples, then the best of those by all.
   void RankAllInTwoPasses(const PoseSearchOptions& options);
@@ -87,8 +87,8 @@ class PoseSearch {
 
   Camera camera_;                   // of the searched image
   std::vector<Segment2> segments_;  // in the searched image
-  LineSamples samples_, few_samples_;
-  DirectionField coarse_field_, fine_field_;
+  LineSamples samples_, half_samples_, few_samples_;
+  DirectionField field_;
   DirectionClusterer clusterer_;
   std::vector<SearchLine> lines_in_prior_;
   std::vector<DirectionCluster> clusters_;

@@ -1,6 +1,7 @@
 /* A host program in C99: uses the interface as meant, then in every wrong way there is.
  * usage: abi_test FIXTURE (from write_fixture) */
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,6 +32,8 @@ static int num_failures = 0;
 typedef struct fixture {
   char map_path[1024];
   uint8_t* pixels[NUM_FRAMES];
+  uint8_t* through_radtan; /* frame 0 through lenses */
+  uint8_t* through_fisheye;
   uint32_t width_px, height_px;
   double camera[4];
   double prior_q[NUM_FRAMES][4], prior_t[NUM_FRAMES][3];
@@ -45,11 +48,25 @@ static int read_numbers(FILE* file, double* out, int count) {
   return 1;
 }
 
+/* All images have one size. */
+static uint8_t* read_image(const char* path, fixture* out) {
+  unsigned w, h;
+  uint8_t* pixels;
+  FILE* file = fopen(path, "rb");
+  if (file == NULL || fscanf(file, "P5 %u %u 255", &w, &h) != 2) return NULL;
+  fgetc(file);
+  out->width_px = w;
+  out->height_px = h;
+  pixels = malloc((size_t)w * h);
+  if (pixels == NULL || fread(pixels, w, h, file) != h) return NULL;
+  fclose(file);
+  return pixels;
+}
+
 static int read_fixture(const char* folder, fixture* out) {
   char path[1100];
   FILE* file;
   int i;
-  unsigned w, h;
   snprintf(out->map_path, sizeof out->map_path, "%s/map", folder);
   snprintf(path, sizeof path, "%s/poses.txt", folder);
   file = fopen(path, "r");
@@ -65,16 +82,14 @@ static int read_fixture(const char* folder, fixture* out) {
   fclose(file);
   for (i = 0; i < NUM_FRAMES; ++i) {
     snprintf(path, sizeof path, "%s/%d.pgm", folder, i);
-    file = fopen(path, "rb");
-    if (file == NULL || fscanf(file, "P5 %u %u 255", &w, &h) != 2) return 0;
-    fgetc(file);
-    out->width_px = w;
-    out->height_px = h;
-    out->pixels[i] = malloc((size_t)w * h);
-    if (out->pixels[i] == NULL || fread(out->pixels[i], w, h, file) != h) return 0;
-    fclose(file);
+    out->pixels[i] = read_image(path, out);
+    if (out->pixels[i] == NULL) return 0;
   }
-  return 1;
+  snprintf(path, sizeof path, "%s/radtan.pgm", folder);
+  out->through_radtan = read_image(path, out);
+  snprintf(path, sizeof path, "%s/fisheye.pgm", folder);
+  out->through_fisheye = read_image(path, out);
+  return out->through_radtan != NULL && out->through_fisheye != NULL;
 }
 
 static plumb_frame make_frame(const fixture* f, int i) {
@@ -301,6 +316,75 @@ static void test_points(const fixture* f, const plumb_map* map) {
   plumb_session_destroy(session);
 }
 
+/* Refines frame 0; returns its result. */
+static plumb_frame_result refine_frame(const plumb_session_options* options,
+                                       const plumb_frame* frame) {
+  plumb_session* session = make_session(options);
+  plumb_frame_result result = empty_result();
+  EXPECT(plumb_session_submit_frame(session, frame) == PLUMB_OK);
+  EXPECT(plumb_session_wait_result(session, 60 * SECOND_NS, &result) == PLUMB_OK);
+  EXPECT(result.outcome == PLUMB_OUTCOME_PROCESSED);
+  plumb_session_destroy(session);
+  return result;
+}
+
+/* Images through a lens are refined as well as those without; the same images taken for a
+ * pinhole's are not; a caller from before there were lenses has none. */
+static void test_lenses(const fixture* f, const plumb_map* map) {
+  const plumb_session_options options = make_options(map);
+  plumb_frame frame = make_frame(f, 0);
+  plumb_frame_result result;
+  frame.planes[0] = f->through_radtan;
+  frame.lens_model = PLUMB_LENS_RADTAN;
+  frame.lens_distortion[0] = -0.3;
+  frame.lens_distortion[1] = 0.1;
+  frame.lens_distortion[2] = 0.001;
+  frame.lens_distortion[3] = -0.002;
+  result = refine_frame(&options, &frame);
+  EXPECT(result.status == PLUMB_STATUS_REFINED);
+  EXPECT(translation_error(f, 0, result.t_m) < 0.01);
+  frame.struct_size = (uint32_t)offsetof(plumb_frame, lens_model);
+  result = refine_frame(&options, &frame);
+  EXPECT(result.status != PLUMB_STATUS_REFINED || translation_error(f, 0, result.t_m) > 0.01);
+
+  frame = make_frame(f, 0);
+  frame.planes[0] = f->through_fisheye;
+  frame.lens_model = PLUMB_LENS_KANNALA_BRANDT;
+  frame.lens_distortion[0] = -0.02;
+  frame.lens_distortion[1] = 0.005;
+  result = refine_frame(&options, &frame);
+  EXPECT(result.status == PLUMB_STATUS_REFINED);
+  EXPECT(translation_error(f, 0, result.t_m) < 0.01);
+}
+
+/* Each detection option changes what is found; a caller from before they were there has none. */
+static void test_detection_options(const fixture* f, const plumb_map* map) {
+  const plumb_frame frame = make_frame(f, 0);
+  const plumb_session_options plain = make_options(map);
+  plumb_session_options options;
+  const uint32_t usual = refine_frame(&plain, &frame).num_segments;
+  EXPECT(usual > 40);
+#define EXPECT_SEGMENTS(change, relation)                         \
+  do {                                                            \
+    options = plain;                                              \
+    change;                                                       \
+    EXPECT(refine_frame(&options, &frame).num_segments relation); \
+  } while (0)
+  EXPECT_SEGMENTS(options.score_threshold = 0.5, < usual);
+  EXPECT_SEGMENTS(options.min_length_px = 30.0, < usual);
+  EXPECT_SEGMENTS(options.structural_nms = 2000.0, < usual);
+  EXPECT_SEGMENTS(options.top_k = 10, <= 20); /* each may bring its other border */
+  EXPECT_SEGMENTS(options.top_k = 10; options.edge_flags = PLUMB_EDGE_ONE_BORDER, <= 10);
+  EXPECT_SEGMENTS(options.tile_columns = 2; options.tile_rows = 2, != 0);
+  EXPECT_SEGMENTS(options.tile_columns = options.tile_rows = PLUMB_TILES_AUTO, == usual);
+  EXPECT_SEGMENTS(options.edge_min_length_px = 30.0, < usual);
+  EXPECT_SEGMENTS(options.edge_flags = PLUMB_EDGE_KEEP_DUPLICATES, >= usual); /* LSD has none */
+  EXPECT_SEGMENTS(options.edge_flags = PLUMB_EDGE_KEEP_ENDS, != 0);
+  EXPECT_SEGMENTS(options.struct_size = (uint32_t)offsetof(plumb_session_options, score_threshold);
+                  options.top_k = 1, == usual);
+#undef EXPECT_SEGMENTS
+}
+
 /* Whatever the settings: results come, in order, and a black image returns the prior. */
 static void test_every_mode_and_method(const fixture* f, const plumb_map* map) {
   int combination;
@@ -427,6 +511,15 @@ static void test_broken_frames(const fixture* f, const plumb_map* map) {
   EXPECT_REFUSED(frame.prior_rotation_sigma_rad = NAN, "rotation_sigma_rad");
   EXPECT_REFUSED(frame.num_points = 0xffffffffu, "num_points");
   EXPECT_REFUSED(frame.reserved = 1, "reserved");
+  EXPECT_REFUSED(frame.lens_model = 3, "lens_model 3");
+  EXPECT_REFUSED(frame.lens_model = -1, "lens_model -1");
+  EXPECT_REFUSED(frame.reserved_lens = 1, "reserved_lens");
+  EXPECT_REFUSED(frame.lens_distortion[0] = 0.1, "lens_distortion[0] 0.1");
+  EXPECT_REFUSED(frame.lens_model = PLUMB_LENS_KANNALA_BRANDT;
+                 frame.lens_distortion[4] = 0.1, "lens_distortion[4] 0.1");
+  EXPECT_REFUSED(frame.lens_model = PLUMB_LENS_RADTAN;
+                 frame.lens_distortion[7] = NAN, "lens_distortion[7] nan");
+  EXPECT_REFUSED(frame.lens_model = PLUMB_LENS_RADTAN; frame.lens_distortion[0] = -1e9, "camera");
 #undef EXPECT_REFUSED
   EXPECT_ERROR(plumb_session_submit_frame(session, NULL), PLUMB_ERROR_INVALID_ARGUMENT, "NULL");
   EXPECT_ERROR(plumb_session_submit_frame(NULL, &good), PLUMB_ERROR_INVALID_ARGUMENT, "session");
@@ -470,6 +563,21 @@ static void test_broken_options(const plumb_map* map) {
   EXPECT_REFUSED(options.deadline_ns = -1, PLUMB_ERROR_INVALID_ARGUMENT, "deadline_ns");
   EXPECT_REFUSED(options.submit_timeout_ns = -1, PLUMB_ERROR_INVALID_ARGUMENT, "submit_timeout_ns");
   EXPECT_REFUSED(options.result_capacity = 9999, PLUMB_ERROR_INVALID_ARGUMENT, "result_capacity");
+  EXPECT_REFUSED(options.score_threshold = 1.5, PLUMB_ERROR_INVALID_ARGUMENT,
+                 "score_threshold 1.5");
+  EXPECT_REFUSED(options.score_threshold = NAN, PLUMB_ERROR_INVALID_ARGUMENT,
+                 "score_threshold nan");
+  EXPECT_REFUSED(options.min_length_px = -1.0, PLUMB_ERROR_INVALID_ARGUMENT, "min_length_px -1");
+  EXPECT_REFUSED(options.structural_nms = 2e5, PLUMB_ERROR_INVALID_ARGUMENT,
+                 "structural_nms 200000");
+  EXPECT_REFUSED(options.top_k = 5000, PLUMB_ERROR_INVALID_ARGUMENT, "top_k 5000");
+  EXPECT_REFUSED(options.tile_columns = 2, PLUMB_ERROR_INVALID_ARGUMENT, "2 x 0");
+  EXPECT_REFUSED(options.tile_rows = PLUMB_TILES_AUTO, PLUMB_ERROR_INVALID_ARGUMENT, "0 x -1");
+  EXPECT_REFUSED(options.tile_columns = options.tile_rows = 65, PLUMB_ERROR_INVALID_ARGUMENT,
+                 "65 x 65");
+  EXPECT_REFUSED(options.edge_flags = 8, PLUMB_ERROR_INVALID_ARGUMENT, "edge_flags 8");
+  EXPECT_REFUSED(options.edge_min_length_px = 0.5, PLUMB_ERROR_INVALID_ARGUMENT,
+                 "edge_min_length_px 0.5");
   EXPECT_REFUSED(options.model_data = &good, PLUMB_ERROR_INVALID_ARGUMENT, "model_data");
   EXPECT_REFUSED(options.model_size_bytes = 7, PLUMB_ERROR_INVALID_ARGUMENT, "model_size_bytes");
 #undef EXPECT_REFUSED
@@ -523,6 +631,8 @@ int main(int argc, char** argv) {
   test_pose_conventions(&f, map);
   test_covariance_as_prior(&f, map);
   test_points(&f, map);
+  test_lenses(&f, map);
+  test_detection_options(&f, map);
   test_every_mode_and_method(&f, map);
   test_callbacks(&f, map);
   test_destroy_with_frames_in_flight(&f, map);
@@ -531,6 +641,8 @@ int main(int argc, char** argv) {
   test_other_misuse(map);
   plumb_map_destroy(map);
   for (i = 0; i < NUM_FRAMES; ++i) free(f.pixels[i]);
+  free(f.through_radtan);
+  free(f.through_fisheye);
   if (num_failures > 0) fprintf(stderr, "%d expectations failed\n", num_failures);
   return num_failures == 0 ? 0 : 1;
 }

@@ -27,7 +27,10 @@ CHECK(options_model, offsetof(plumb_session_options, model) == SIZE(24, 20));
 CHECK(options_device, offsetof(plumb_session_options, device) == 48);
 CHECK(options_support, offsetof(plumb_session_options, min_map_support) == 72);
 CHECK(options_callback, offsetof(plumb_session_options, on_result) == 112);
-CHECK(options_size, sizeof(plumb_session_options) == 128);
+CHECK(options_detection, offsetof(plumb_session_options, score_threshold) == 128);
+CHECK(options_top_k, offsetof(plumb_session_options, top_k) == 152);
+CHECK(options_edges, offsetof(plumb_session_options, edge_min_length_px) == 168);
+CHECK(options_size, sizeof(plumb_session_options) == 176);
 #endif
 
 CHECK(frame_planes, offsetof(plumb_frame, planes) == 16);
@@ -38,7 +41,9 @@ CHECK(frame_rotation, offsetof(plumb_frame, prior_q_xyzw) == 120);
 CHECK(frame_covariance, offsetof(plumb_frame, prior_covariance) == 192);
 CHECK(frame_points, offsetof(plumb_frame, points_px) == 480);
 CHECK(frame_release, offsetof(plumb_frame, release) == 512);
-CHECK(frame_size, sizeof(plumb_frame) == 528);
+CHECK(frame_lens, offsetof(plumb_frame, lens_model) == 528);
+CHECK(frame_distortion, offsetof(plumb_frame, lens_distortion) == 536);
+CHECK(frame_size, sizeof(plumb_frame) == 600);
 #endif
 
 CHECK(frame_result_index, offsetof(plumb_frame_result, frame_index) == 16);

@@ -160,9 +160,13 @@ class NetworkTest : public ::testing::Test {
   void TearDown() override { plumb_map_destroy(map_); }
 
   // Opens a session with `options_`, sends one frame through, closes it.
-  void ExpectLinesFound() {
+  void ExpectLinesFound() { EXPECT_GT(CountSegments(), 10u); }
+
+  // The number of segments that such a session finds in a frame.
+  uint32_t CountSegments() {
     plumb_session* session = nullptr;
-    ASSERT_EQ(plumb_session_create(&options_, &session), PLUMB_OK) << plumb_last_error();
+    EXPECT_EQ(plumb_session_create(&options_, &session), PLUMB_OK) << plumb_last_error();
+    if (session == nullptr) return 0;
     const testing::GrayImage image = scene_.Render(TruePose());
     plumb_frame frame{};
     frame.struct_size = sizeof frame;
@@ -184,8 +188,8 @@ class NetworkTest : public ::testing::Test {
     result.struct_size = sizeof result;
     EXPECT_EQ(plumb_session_wait_result(session, kMinuteNs, &result), PLUMB_OK);
     EXPECT_EQ(result.outcome, PLUMB_OUTCOME_PROCESSED) << result.error_message;
-    EXPECT_GT(result.num_segments, 10u);
     plumb_session_destroy(session);
+    return result.num_segments;
   }
   void ExpectRefused(plumb_result code, const std::string& part) {
     plumb_session* session = nullptr;
@@ -203,6 +207,19 @@ class NetworkTest : public ::testing::Test {
 TEST_F(NetworkTest, BuiltInNetworkIsFoundByItsName) {
   options_.model = "nano";
   ExpectLinesFound();
+}
+
+TEST_F(NetworkTest, DetectionOptionsReachTheNetworkAndTheEdges) {
+  options_.model = "nano";
+  const uint32_t usual = CountSegments();
+  options_.edge_flags = PLUMB_EDGE_KEEP_DUPLICATES;
+  EXPECT_GT(CountSegments(), usual);
+  options_.edge_flags = PLUMB_EDGE_ONE_BORDER;
+  options_.top_k = 5;
+  EXPECT_LE(CountSegments(), 5u);
+  options_.top_k = 0;
+  options_.score_threshold = 1.0;
+  EXPECT_LT(CountSegments(), usual);
 }
 
 TEST_F(NetworkTest, WeightsMayComeFromMemoryAndRunOnTheHostsDevice) {

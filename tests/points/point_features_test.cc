@@ -108,7 +108,8 @@ TEST(LiftPoints, PutsPointsOnTheSurfaceThatTheyShow) {
   const RenderedView view = TexturedCorner(2).Render(kCamera, {rotation, {0.1, 0.2, 0.3}});
   ImagePoints points;
   ASSERT_TRUE(PointExtractor().Extract(ViewOf(view), &points));
-  const auto lifted = LiftPoints(points, kCamera, view.cam_from_world, DepthOf(view));
+  const auto lifted =
+      LiftPoints(points, *Rectifier::Create(kCamera), view.cam_from_world, DepthOf(view));
   EXPECT_GT(lifted.size(), points.size() / 2);
   for (const MapPoint& point : lifted) {
     const Eigen::Vector3d x = point.point_in_world.cast<double>();
@@ -128,7 +129,8 @@ class OnePointTest : public ::testing::Test {
   }
   size_t NumLifted() const {
     const DepthView view = {DepthFormat::kFloat, depth_.data(), 36, 9, 9, 1.0};
-    return LiftPoints(points_, {100.0, 100.0, 4.0, 4.0, 9, 9}, {}, view).size();
+    return LiftPoints(points_, *Rectifier::Create(Camera{100.0, 100.0, 4.0, 4.0, 9, 9}), {}, view)
+        .size();
   }
   float& DepthAt(int x, int y) { return depth_[static_cast<size_t>(9 * y + x)]; }
 

@@ -165,7 +165,7 @@ class RenderedPointsTest : public ::testing::Test {
       key_frame.cam_from_world = view.cam_from_world;
       key_frame.camera = kCamera;
       key_frame.points =
-          LiftPoints(points, kCamera, view.cam_from_world,
+          LiftPoints(points, *Rectifier::Create(kCamera), view.cam_from_world,
                      {DepthFormat::kFloat, view.depth_m.data(), 4LL * kCamera.width_px,
                       kCamera.width_px, kCamera.height_px, 1.0});
       made.map.key_frames.push_back(std::move(key_frame));

@@ -27,7 +27,7 @@ struct HostFrame {
     frame.image.height_px = 2;
     frame.image.planes[0] = {luma.data(), 5};
     frame.image.planes[1] = {chroma.data(), 6};
-    frame.camera = {4.0, 4.0, 1.5, 0.5, 4, 2};
+    frame.camera = Camera{4.0, 4.0, 1.5, 0.5, 4, 2};
     frame.timestamp_ns = 5;
   }
   void BorrowImage() {
@@ -47,7 +47,7 @@ TEST(FrameSlot, CopiesEveryPlaneWithoutItsPadding) {
   HostFrame host;
   ASSERT_TRUE(ValidateFrame(host.frame));
   FrameSlot slot;
-  slot.Assign(host.frame, 0);
+  slot.Assign(host.frame, *Rectifier::Create(host.frame.camera), 0);
   EXPECT_EQ(slot.pixels, (std::vector<uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13}));
   EXPECT_TRUE(slot.image.Validate());
   EXPECT_EQ(slot.image.planes[0].data, slot.pixels.data());
@@ -59,7 +59,7 @@ TEST(FrameSlot, BorrowsTheImageThatComesWithARelease) {
   HostFrame host;
   host.BorrowImage();
   FrameSlot slot;
-  slot.Assign(host.frame, 0);
+  slot.Assign(host.frame, *Rectifier::Create(host.frame.camera), 0);
   EXPECT_EQ(slot.image.planes[0].data, host.luma.data());
   EXPECT_EQ(host.num_released, 0);
   slot.ReleaseImage();
@@ -74,7 +74,7 @@ TEST(FrameSlot, AssignKeepsPointsAndNormalisesTheRotation) {
   host.frame.prior.cam_from_world.rotation = Eigen::Quaterniond(1.0005, 0, 0, 0);
   ASSERT_TRUE(ValidateFrame(host.frame));
   FrameSlot slot;
-  slot.Assign(host.frame, 0);
+  slot.Assign(host.frame, *Rectifier::Create(host.frame.camera), 0);
   EXPECT_EQ(slot.points.size(), 3u);
   EXPECT_DOUBLE_EQ(slot.ticket.prior.cam_from_world.rotation.norm(), 1.0);
 }
@@ -85,10 +85,10 @@ TEST(ValidateFrame, NamesWhatIsBroken) {
   frame.image.planes[1].row_stride_bytes = 3;
   ExpectRefused(frame, "planes[1].row_stride_bytes 3");
   frame = host.frame;
-  frame.camera.fx = 0.0;
+  frame.camera.pinhole.fx = 0.0;
   ExpectRefused(frame, "camera");
   frame = host.frame;
-  frame.camera.width_px = 8;
+  frame.camera.pinhole.width_px = 8;
   ExpectRefused(frame, "camera is for 8 x 2 px");
   frame = host.frame;
   frame.prior.cam_from_world.translation.x() = kNan;

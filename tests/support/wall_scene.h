@@ -12,8 +12,8 @@
 
 #include <Eigen/Core>
 
-#include "plumb/geometry/camera.h"
 #include "plumb/geometry/line_projection.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/map/line_map.h"
 #include "support/edge_image.h"
@@ -34,9 +34,10 @@ class WallScene {
 
   Camera camera{290.0, 290.0, 159.5, 119.5, 320, 240};
 
-  /// The image, each pixel the mean of 3 x 3 rays.
-  GrayImage Render(const Rigid3& cam_from_world) const {
+  /// The image, each pixel the mean of 3 x 3 rays; with a lens, those that it lets through.
+  GrayImage Render(const Rigid3& cam_from_world, const Lens& lens = {}) const {
     constexpr int kRays = 3;
+    const Rectifier rectifier = *Rectifier::Create({camera, lens});
     GrayImage image(camera.width_px, camera.height_px);
     const Eigen::Matrix3d world_from_cam = cam_from_world.RotationMatrix().transpose();
     const Eigen::Vector3d centre = cam_from_world.Center();
@@ -46,7 +47,9 @@ class WallScene {
         for (int i = 0; i < kRays * kRays; ++i) {
           const Eigen::Vector2d px(u + (i % kRays + 0.5) / kRays - 0.5,
                                    v + (i / kRays + 0.5) / kRays - 0.5);
-          sum += Shade(centre, world_from_cam * camera.Normalize(px).homogeneous());
+          const auto ideal = rectifier.ToIdeal(px);
+          if (!ideal) continue;
+          sum += Shade(centre, world_from_cam * rectifier.ideal().Normalize(*ideal).homogeneous());
         }
         image.At(u, v) = static_cast<uint8_t>(std::lround(sum / (kRays * kRays)));
       }

@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/tools/temporary_directory.h"
+#include "tools/datasets/camera_file.h"
 #include "tools/datasets/image_file.h"
 #include "tools/datasets/line_annotations.h"
 #include "tools/datasets/timestamp.h"
@@ -201,6 +202,72 @@ TEST_F(Sequence, CameraErrorsNameTheMember) {
     const Result<TumSequence> sequence = ReadTumSequence(dir_.path());
     ASSERT_FALSE(sequence) << c.json;
     EXPECT_THAT(sequence.error().message, HasSubstr(c.message)) << c.json;
+  }
+}
+
+TEST_F(Sequence, ReadsLensesUnderTheirNames) {
+  const struct {
+    const char* members;
+    Lens lens;
+  } cases[] = {
+      {R"("model": "PINHOLE")", {}},
+      {R"("model": "PINHOLE", "distortion_coefficients": [0, 0.0])", {}},
+      {R"("model": "RADTAN", "distortion_coefficients": [-0.3, 0.1, 0.01, -0.02])",
+       {LensModel::kRadTan, {-0.3, 0.1, 0.01, -0.02}}},
+      {R"("model": "OPENCV", "distortion_coefficients": [-0.3, 0.1, 0.01, -0.02])",
+       {LensModel::kRadTan, {-0.3, 0.1, 0.01, -0.02}}},
+      {R"("model": "RADTAN", "distortion_coefficients": [-0.3, 0.1, 0, 0, 0.05])",
+       {LensModel::kRadTan, {-0.3, 0.1, 0, 0, 0.05}}},
+      {R"("model": "FULL_OPENCV", "distortion_coefficients": [0.1, 0.2, 0, 0, 0.01, 0.2, 0.1, 0.02])",
+       {LensModel::kRadTan, {0.1, 0.2, 0, 0, 0.01, 0.2, 0.1, 0.02}}},
+      {R"("model": "KANNALA_BRANDT", "distortion_coefficients": [0.1, 0.2, 0.3, 0.4])",
+       {LensModel::kKannalaBrandt, {0.1, 0.2, 0.3, 0.4}}},
+      {R"("model": "OPENCV_FISHEYE", "distortion_coefficients": [0.1, 0.2, 0.3, 0.4])",
+       {LensModel::kKannalaBrandt, {0.1, 0.2, 0.3, 0.4}}}};
+  for (const auto& c : cases) {
+    const std::string text =
+        std::string("{") + c.members +
+        R"(, "width": 64, "height": 48, "fx": 60, "fy": -61, "cx": 30, "cy": 25, "depth_scale": 5000})";
+    dir_.Write("camera.json", text);
+    const Result<TumSequence> sequence = ReadTumSequence(dir_.path());
+    ASSERT_TRUE(sequence) << c.members << ": " << sequence.error().message;
+    EXPECT_EQ(sequence->rectifier.image_camera().lens, c.lens) << c.members;
+    EXPECT_EQ(sequence->rectifier.image_camera().pinhole.width_px, 64);
+    EXPECT_EQ(sequence->camera, sequence->rectifier.ideal());
+    // And back.
+    const Result<CameraFile> again = ParseCameraFile(
+        FormatCameraFile({sequence->rectifier.image_camera(), 5000.0}, "a test"), "x", true);
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->camera, sequence->rectifier.image_camera());
+    EXPECT_EQ(again->depth_scale, 5000.0);
+  }
+}
+
+TEST_F(Sequence, BadLensesAreNamedByMemberAndValue) {
+  const struct {
+    const char* members;
+    const char* message;
+  } cases[] = {
+      {R"("model": "RADTAN")", "\"distortion_coefficients\" is missing, RADTAN"},
+      {R"("model": "RADTAN", "distortion_coefficients": [1, 2, 3])", "[1,2,3]: RADTAN has 3"},
+      {R"("model": "RADTAN", "distortion_coefficients": 0.3)", "is 0.3: no array"},
+      {R"("model": "RADTAN", "distortion_coefficients": [0, 0, 0, "x"])", "\"x\" is no number"},
+      {R"("model": "RADTAN", "distortion_coefficients": [0, 0, 0, null])", "null is no number"},
+      {R"("model": "RADTAN", "distortion_coefficients": [-1e9, 0, 0, 0])", "does not grow"},
+      {R"("model": "OPENCV", "distortion_coefficients": [0, 0, 0, 0, 0])", "OPENCV has 4"},
+      {R"("model": "KANNALA_BRANDT", "distortion_coefficients": [0, 0, 0])",
+       "KANNALA_BRANDT has 4"},
+      {R"("distortion_coefficients": [0.1, 0, 0, 0])", "[0.1,0,0,0]: PINHOLE has none"},
+      {R"("model": 7)", "\"model\" is 7, known are PINHOLE RADTAN"}};
+  for (const auto& c : cases) {
+    dir_.Write("camera.json",
+               std::string("{") + c.members +
+                   R"(, "width": 64, "height": 48, "fx": 60, "fy": 60, "cx": 30, "cy": 25,
+                   "depth_scale": 5000})");
+    const Result<TumSequence> sequence = ReadTumSequence(dir_.path());
+    ASSERT_FALSE(sequence) << c.members;
+    EXPECT_THAT(sequence.error().message, HasSubstr(c.message)) << c.members;
+    EXPECT_THAT(sequence.error().message, HasSubstr(dir_ / "camera.json"));
   }
 }
 

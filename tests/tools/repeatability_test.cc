@@ -31,7 +31,7 @@ struct WallViews {
     Rigid3 second_from_world;
     second_from_world.translation.x() = kShiftPx / kFocalPx * kDepthM;
     RepeatabilityTally tally;
-    AddPair(camera, {Rigid3(), ViewOf(first_depth), first},
+    AddPair(*Rectifier::Create(camera), {Rigid3(), ViewOf(first_depth), first},
             {second_from_world, ViewOf(second_depth), second}, &tally);
     return tally;
   }
@@ -144,8 +144,8 @@ TEST(Repeatability, PairsAddUp) {
   RepeatabilityTally tally;
   const RepeatabilityView view{Rigid3(), views.ViewOf(views.first_depth), views.first};
   const RepeatabilityView blind{Rigid3(), views.ViewOf(views.first_depth), {}};
-  AddPair(views.camera, view, view, &tally);
-  AddPair(views.camera, view, blind, &tally);
+  AddPair(*Rectifier::Create(views.camera), view, view, &tally);
+  AddPair(*Rectifier::Create(views.camera), view, blind, &tally);
   EXPECT_EQ(tally.num_pairs, 2u);
   EXPECT_DOUBLE_EQ(tally.FoundShare(), 0.5);
   EXPECT_EQ(tally.errors_px.size(), 1u);

@@ -56,7 +56,8 @@ RenderOptions Plain() {
 
 TEST(Render, DepthOfAFacingWallIsItsDistanceAlongTheAxis) {
   const Camera camera = SmallCamera();
-  const RgbdImage image = Render(EmptyRoom(), camera, LookAlongX({0.0, 0.0, 1.2}), Plain());
+  const RgbdImage image =
+      Render(EmptyRoom(), *Rectifier::Create(camera), LookAlongX({0.0, 0.0, 1.2}), Plain());
   for (int x = 0; x < camera.width_px; ++x) {
     const size_t middle_row = 31;
     EXPECT_NEAR(image.depth_m[middle_row * 80 + static_cast<size_t>(x)], 4.0, 1e-5)
@@ -68,7 +69,8 @@ TEST(Render, ABoxHidesTheWallBehindIt) {
   Scene scene = EmptyRoom();
   scene.groups.emplace_back();
   AddBox(UnitBox({3.0, 0.0, 1.2}), &scene.groups.back());
-  const RgbdImage image = Render(scene, SmallCamera(), LookAlongX({0.0, 0.0, 1.2}), Plain());
+  const RgbdImage image =
+      Render(scene, *Rectifier::Create(SmallCamera()), LookAlongX({0.0, 0.0, 1.2}), Plain());
   EXPECT_NEAR(image.depth_m[32 * 80 + 40], 2.5, 1e-5);
   EXPECT_NEAR(image.depth_m[32 * 80 + 2], 4.0, 1e-5);
 }
@@ -78,12 +80,12 @@ TEST(Render, EqualInputsGiveEqualBytes) {
   const Rigid3 pose = MakeCameraPath(scene, 3, 1.0, 3)[1];
   RenderOptions options = Plain();
   options.noise_grey_levels = 2.0;
-  const RgbdImage a = Render(scene, SmallCamera(), pose, options);
-  const RgbdImage b = Render(scene, SmallCamera(), pose, options);
+  const RgbdImage a = Render(scene, *Rectifier::Create(SmallCamera()), pose, options);
+  const RgbdImage b = Render(scene, *Rectifier::Create(SmallCamera()), pose, options);
   EXPECT_EQ(a.bgr, b.bgr);
   EXPECT_EQ(a.depth_m, b.depth_m);
   options.noise_seed = 1;
-  EXPECT_NE(Render(scene, SmallCamera(), pose, options).bgr, a.bgr);
+  EXPECT_NE(Render(scene, *Rectifier::Create(SmallCamera()), pose, options).bgr, a.bgr);
 }
 
 TEST(Render, ShadowsDarkenWhatALampCannotReach) {
@@ -99,8 +101,8 @@ TEST(Render, ShadowsDarkenWhatALampCannotReach) {
   pose.translation = -(pose.rotation * Eigen::Vector3d(2.0, 0.0, 0.9));
   RenderOptions lit = Plain();
   lit.shadows = false;
-  const RgbdImage with = Render(scene, SmallCamera(), pose, Plain());
-  const RgbdImage without = Render(scene, SmallCamera(), pose, lit);
+  const RgbdImage with = Render(scene, *Rectifier::Create(SmallCamera()), pose, Plain());
+  const RgbdImage without = Render(scene, *Rectifier::Create(SmallCamera()), pose, lit);
   const size_t pixel = 3 * (32 * 80 + 40);
   EXPECT_LT(with.bgr[pixel] + 20, without.bgr[pixel]);
 }

@@ -2,14 +2,12 @@
 #include "tools/datasets/tum_sequence.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
+#include "tools/datasets/camera_file.h"
 #include "tools/datasets/text_file.h"
 #include "tools/datasets/timestamp.h"
 #include "tools/datasets/trajectory.h"
@@ -18,7 +16,6 @@ namespace plumb::tools {
 namespace {
 
 constexpr int64_t kSameFrameNs = 1'000'000;
-constexpr int kMaxSidePx = 16384;
 
 bool Exists(const std::string& path) {
   std::error_code code;
@@ -82,44 +79,15 @@ std::optional<size_t> Nearest(const std::vector<Item>& items, int64_t timestamp_
 Status ReadCamera(const std::string& path, bool with_depth, TumSequence* sequence) {
   const Result<std::string> text = ReadFile(path);
   if (!text) return text.error();
-  const auto corrupt = [&](const std::string& message) {
-    return Error{ErrorCode::kCorruptData, path + ": " + message};
-  };
-  const nlohmann::json json = nlohmann::json::parse(*text, nullptr, false);
-  if (!json.is_object()) return corrupt("is no JSON object");
-  if (json.contains("model") && json["model"] != "PINHOLE") {
-    return Error{ErrorCode::kUnsupported,
-                 path + ": camera model " + json["model"].dump() + ", only \"PINHOLE\" is read"};
+  const Result<CameraFile> file = ParseCameraFile(*text, path, with_depth);
+  if (!file) return file.error();
+  const Result<Rectifier> rectifier = Rectifier::Create(file->camera);
+  if (!rectifier) {
+    return Error{ErrorCode::kCorruptData, path + ": " + rectifier.error().message};
   }
-  const auto number = [&](const char* key, double* out) -> Status {
-    if (!json.contains(key)) return corrupt(std::string("\"") + key + "\" is missing");
-    if (!json[key].is_number() || !std::isfinite(json[key].get<double>())) {
-      return corrupt(std::string("\"") + key + "\" is " + json[key].dump() + ", no number");
-    }
-    *out = json[key].get<double>();
-    return Ok();
-  };
-  Camera& camera = sequence->camera;
-  double width = 0.0, height = 0.0;
-  const std::pair<const char*, double*> members[] = {{"width", &width},  {"height", &height},
-                                                     {"fx", &camera.fx}, {"fy", &camera.fy},
-                                                     {"cx", &camera.cx}, {"cy", &camera.cy}};
-  for (const auto& [key, value] : members) {
-    if (const Status read = number(key, value); !read) return read.error();
-  }
-  for (const auto& [key, value] : {members[0], members[1]}) {
-    if (!(*value >= 1.0 && *value <= kMaxSidePx && *value == std::floor(*value))) {
-      return corrupt(std::string("\"") + key + "\" is " + json[key].dump() + ", want 1 to 16384");
-    }
-  }
-  camera.width_px = static_cast<int>(width);
-  camera.height_px = static_cast<int>(height);
-  if (!camera.IsValid()) return corrupt("\"fx\" or \"fy\" is 0");
-  if (!with_depth && !json.contains("depth_scale")) return Ok();
-  if (const Status read = number("depth_scale", &sequence->depth_scale); !read) return read.error();
-  if (!(sequence->depth_scale > 0.0)) {
-    return corrupt("\"depth_scale\" is " + json["depth_scale"].dump() + ", want a positive number");
-  }
+  sequence->rectifier = *rectifier;
+  sequence->camera = rectifier->ideal();
+  sequence->depth_scale = file->depth_scale;
   return Ok();
 }
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "plumb/base/result.h"
-#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/rigid3.h"
 
 namespace plumb::tools {
@@ -25,14 +25,14 @@ struct SequenceFrame {
 
 struct TumSequence {
   std::string directory;
-  Camera camera;
+  Rectifier rectifier;                // of the images' camera and lens
+  Camera camera;                      // the ideal one behind it: rectifier.ideal()
   double depth_scale = 0.0;           // depth image units per metre
   std::vector<SequenceFrame> frames;  // ascending in time, every timestamp once
 };
 
 /// Reads the sequence's text files; images stay unread. depth.txt and groundtruth.txt may be
-/// absent. camera.json: {"model": "PINHOLE", "width", "height", "fx", "fy", "cx", "cy",
-/// "depth_scale"} (the last is needed only with depth).
+/// absent. camera.json: camera_file.h ("depth_scale" is needed only with depth).
 /// @return kNotFound for a missing directory, rgb.txt or camera.json; kCorruptData naming file,
 /// line
 ///         or member and value; kUnsupported for another camera model.

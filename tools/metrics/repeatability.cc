@@ -33,14 +33,16 @@ double FarthestDepth(const DepthView& depth, const Eigen::Vector2d& px) {
 }
 
 /// Whether half or more of the segment lies behind what `depth` shows.
-bool IsOccluded(const Camera& camera, const DepthView& depth, const Segment3& segment_in_cam) {
+bool IsOccluded(const Rectifier& rectifier, const DepthView& depth,
+                const Segment3& segment_in_cam) {
   int num_hidden = 0, num_inside = 0;
   for (int i = 0; i < kDepthSamples; ++i) {
     const double share = (i + 0.5) / kDepthSamples;
     const Eigen::Vector3d point = segment_in_cam.start + share * segment_in_cam.Delta();
     if (point.z() < kNearPlane) continue;
-    const Eigen::Vector2d px = camera.Project(point);
-    if (!camera.Contains(px)) continue;
+    const auto image = rectifier.ToImage(rectifier.ideal().Project(point));
+    if (!image || !rectifier.image_camera().pinhole.Contains(image->px)) continue;
+    const Eigen::Vector2d& px = image->px;
     ++num_inside;
     const double seen = FarthestDepth(depth, px);
     const double tolerance = 3.0 * DepthNoise().SigmaAt(point.z()) + 0.02;
@@ -82,16 +84,17 @@ std::optional<Gap> GapBetween(const Segment2& expected, const Segment2& detected
 
 }  // namespace
 
-void AddPair(const Camera& camera, const RepeatabilityView& first, const RepeatabilityView& second,
-             RepeatabilityTally* tally) {
+void AddPair(const Rectifier& rectifier, const RepeatabilityView& first,
+             const RepeatabilityView& second, RepeatabilityTally* tally) {
   ++tally->num_pairs;
+  const Camera& camera = rectifier.ideal();
   const Rigid3 second_from_first = second.cam_from_world * first.cam_from_world.Inverse();
-  for (const LiftedPart& part : LiftSegments(camera, first.depth, first.segments)) {
+  for (const LiftedPart& part : LiftSegments(camera, first.depth, first.segments, {}, &rectifier)) {
     const Segment3 in_second{second_from_first * part.segment_in_cam.start,
                              second_from_first * part.segment_in_cam.end};
     const std::optional<Segment2> expected = ProjectSegmentInCam(camera, in_second);
     if (!expected || expected->Length() <= kMinLengthPx) continue;
-    if (IsOccluded(camera, second.depth, in_second)) continue;
+    if (IsOccluded(rectifier, second.depth, in_second)) continue;
     ++tally->num_expected;
     bool found = false;
     double nearest_px = kErrorPx;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
 #include "plumb/map/depth_view.h"
@@ -16,7 +16,7 @@ namespace plumb::tools {
 struct RepeatabilityView {
   Rigid3 cam_from_world;
   DepthView depth;
-  std::span<const Segment2> segments;  // [px]
+  std::span<const Segment2> segments;  // [px of the ideal image]
 };
 
 /// What pairs of views add up to.
@@ -37,8 +37,9 @@ struct RepeatabilityTally {
 /// nearly parallel (sine < 0.087), lies beside more than half of it, and is within 2 px at both
 /// ends of what they share. The error is the mean of the distances at those two ends, of the
 /// nearest such segment within 5 px.
+/// @param rectifier  of the camera and lens of both views
 /// Source: docs/method/association.md.
-void AddPair(const Camera& camera, const RepeatabilityView& first, const RepeatabilityView& second,
-             RepeatabilityTally* tally);
+void AddPair(const Rectifier& rectifier, const RepeatabilityView& first,
+             const RepeatabilityView& second, RepeatabilityTally* tally);
 
 }  // namespace plumb::tools

@@ -62,7 +62,7 @@ Outcome DetectAll(FrameRun* run, std::vector<std::vector<Segment2>>* out_segment
     const ImageView view = ViewOf(*image);
     const Result<std::vector<Segment2>> raw = run->detector->Detect(view);
     if (!raw) return FailureFrom(raw.error());
-    out_segments->push_back(refiner.Refine(view, *raw));
+    out_segments->push_back(refiner.Refine(view, *raw, &run->sequence.rectifier));
     progress.Advance();
   }
   return std::nullopt;

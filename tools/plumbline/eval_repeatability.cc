@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plumb/features/segment_refiner.h"
+#include "plumb/features/straighten.h"
 #include "tools/datasets/image_file.h"
 #include "tools/metrics/percentile.h"
 #include "tools/metrics/repeatability.h"
@@ -56,7 +57,7 @@ class Evaluation {
       if (Outcome failed = Load(index)) return failed;
     }
     for (int kind = 0; kind < kNumProcessings; ++kind) {
-      AddPair(sequence_.camera, At(first, kind), At(second, kind), &figures_[kind].tally);
+      AddPair(sequence_.rectifier, At(first, kind), At(second, kind), &figures_[kind].tally);
     }
     views_.erase(views_.begin(), views_.upper_bound(first));
     return std::nullopt;
@@ -68,7 +69,8 @@ class Evaluation {
   Outcome Load(size_t index) {
     if (views_.contains(index)) return std::nullopt;
     RgbdImages images;
-    if (Outcome failed = ReadRgbdImages(sequence_.frames[index], sequence_.camera, &images)) {
+    if (Outcome failed = ReadRgbdImages(sequence_.frames[index],
+                                        sequence_.rectifier.image_camera().pinhole, &images)) {
       return failed;
     }
     const ImageView image = ViewOf(images.color);
@@ -76,8 +78,8 @@ class Evaluation {
     if (!raw) return FailureFrom(raw.error());
     View& view = views_[index];
     view.depth = images.depth;
-    view.segments[kRefined] = refiner_.Refine(image, *raw);
-    view.segments[kRaw] = *std::move(raw);
+    view.segments[kRefined] = refiner_.Refine(image, *raw, &sequence_.rectifier);
+    view.segments[kRaw] = StraightenSegments(sequence_.rectifier, *std::move(raw));
     std::erase_if(view.segments[kRaw],
                   [](const Segment2& segment) { return segment.Length() <= kMinLengthPx; });
     for (int kind = 0; kind < kNumProcessings; ++kind) {

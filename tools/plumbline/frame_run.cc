@@ -221,14 +221,14 @@ Outcome RunFrames(FrameRun* run, const FrameSink& sink) {
     std::vector<PointMatch> points;
     if (run->with_points) {
       Result<std::vector<PointMatch>> matches =
-          point_front_end.QueryMatches(*image, run->sequence.camera, *run->index,
+          point_front_end.QueryMatches(*image, run->sequence.rectifier, *run->index,
                                        run->priors[i].cam_from_world, run->session.refiner.method);
       if (!matches) return FailFrame(frame, matches.error());
       points = *std::move(matches);
     }
     SessionFrame input;
     input.image = ViewOf(*image);
-    input.camera = run->sequence.camera;
+    input.camera = run->sequence.rectifier.image_camera();
     input.timestamp_ns = frame.timestamp_ns;
     input.prior = run->priors[i];
     input.points = points;

@@ -50,22 +50,26 @@ class KeyFrameReader {
   Outcome Read(const SequenceFrame& frame, LoadedKeyFrame* out) {
     const Camera& camera = sequence_.camera;
     RgbdImages images;
-    if (Outcome failed = ReadRgbdImages(frame, camera, &images)) return failed;
+    const Rectifier& rectifier = sequence_.rectifier;
+    if (Outcome failed = ReadRgbdImages(frame, rectifier.image_camera().pinhole, &images)) {
+      return failed;
+    }
     out->depth = images.depth;
 
     const ImageView view = ViewOf(images.color);
     const Result<std::vector<Segment2>> raw = detector_->Detect(view);
     if (!raw) return FailureFrom(raw.error());
-    out->segments = refiner_.Refine(view, *raw);
+    out->segments = refiner_.Refine(view, *raw, &rectifier);
     KeyFrameInput& input = out->input;
     input.timestamp_ns = frame.timestamp_ns;
     input.cam_from_world = *frame.cam_from_world;
     input.camera = camera;
+    input.rectifier = &rectifier;
     input.segments = out->segments;
     input.depth = ViewOfDepth(out->depth, sequence_.depth_scale);
     if (!with_points_) return std::nullopt;
     Result<std::vector<MapPoint>> points =
-        point_front_end_.KeyFramePoints(images.color, camera, input.cam_from_world, input.depth);
+        point_front_end_.KeyFramePoints(images.color, rectifier, input.cam_from_world, input.depth);
     if (!points) return FailureFrom(points.error());
     input.points = *std::move(points);
     return std::nullopt;

@@ -16,6 +16,7 @@ namespace plumb::tools {
 namespace {
 
 constexpr double kScale = 2.0;
+constexpr double kPiecePx = 8.0;  // of a curve, drawn straight
 constexpr int kSubpixelBits = 4;
 constexpr int kCaptionHeight = 34;
 const cv::Scalar kMapColor(255, 140, 40);  // blue, green, red
@@ -30,10 +31,32 @@ cv::Point Fixed(const Eigen::Vector2d& px) {
           static_cast<int>(std::lround(scaled.y() * kOne))};
 }
 
-void Draw(const Segment2& segment, const cv::Scalar& color, int thickness, cv::Mat* canvas) {
-  cv::line(*canvas, Fixed(segment.start), Fixed(segment.end), color, thickness, cv::LINE_AA,
-           kSubpixelBits);
-}
+/// Draws segments of the ideal image where the image shows them.
+class SegmentPainter {
+ public:
+  SegmentPainter(const Rectifier& rectifier, cv::Mat* canvas)
+      : rectifier_(rectifier), canvas_(canvas) {}
+
+  void Draw(const Segment2& segment, const cv::Scalar& color, int thickness) const {
+    const int pieces =
+        rectifier_.IsIdentity() ? 1 : 1 + static_cast<int>(segment.Length() / kPiecePx);
+    std::optional<ImagePoint> last = rectifier_.ToImage(segment.start);
+    for (int i = 1; i <= pieces; ++i) {
+      const double u = static_cast<double>(i) / pieces;
+      const std::optional<ImagePoint> next =
+          rectifier_.ToImage((1.0 - u) * segment.start + u * segment.end);
+      if (last && next) {
+        cv::line(*canvas_, Fixed(last->px), Fixed(next->px), color, thickness, cv::LINE_AA,
+                 kSubpixelBits);
+      }
+      last = next;
+    }
+  }
+
+ private:
+  const Rectifier& rectifier_;
+  cv::Mat* canvas_;
+};
 
 void DrawCaption(const FrameResult& result, size_t num_map_lines, cv::Mat* canvas) {
   cv::rectangle(*canvas, cv::Rect(0, 0, canvas->cols, kCaptionHeight), cv::Scalar(25, 25, 25),
@@ -53,26 +76,28 @@ void DrawCaption(const FrameResult& result, size_t num_map_lines, cv::Mat* canva
 
 }  // namespace
 
-cv::Mat DrawOverlay(const cv::Mat& image, double brightness, const Camera& camera,
+cv::Mat DrawOverlay(const cv::Mat& image, double brightness, const Rectifier& rectifier,
                     const MapIndex& index, const FrameResult& result) {
   cv::Mat canvas;
   cv::resize(image, canvas, {}, kScale, kScale, cv::INTER_LINEAR);
   canvas.convertTo(canvas, -1, brightness);
 
   std::vector<uint32_t> visible;
-  index.VisibleLines(camera, result.refined.cam_from_world, VisibilityOptions{}, &visible);
+  const SegmentPainter painter(rectifier, &canvas);
+  index.VisibleLines(rectifier.ideal(), result.refined.cam_from_world, VisibilityOptions{},
+                     &visible);
   for (const uint32_t line : visible) {
     const std::optional<Segment2> projected = ProjectSegment(
-        camera, result.refined.cam_from_world, index.map().lines[line].segment_in_world);
-    if (projected) Draw(*projected, kMapColor, 3, &canvas);
+        rectifier.ideal(), result.refined.cam_from_world, index.map().lines[line].segment_in_world);
+    if (projected) painter.Draw(*projected, kMapColor, 3);
   }
   std::vector<bool> matched(result.segments.size(), false);
   for (const LineMatch& match : result.refined.matches) matched[match.segment] = true;
   for (size_t i = 0; i < result.segments.size(); ++i) {
-    if (!matched[i]) Draw(result.segments[i], kRejectedColor, 1, &canvas);
+    if (!matched[i]) painter.Draw(result.segments[i], kRejectedColor, 1);
   }
   for (size_t i = 0; i < result.segments.size(); ++i) {
-    if (matched[i]) Draw(result.segments[i], kMatchedColor, 2, &canvas);
+    if (matched[i]) painter.Draw(result.segments[i], kMatchedColor, 2);
   }
   DrawCaption(result, visible.size(), &canvas);
   return canvas;

@@ -1,6 +1,7 @@
 // SIFT points of recorded images, for maps and for queries (--points opencv).
 #include "tools/plumbline/point_front_end.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -10,6 +11,25 @@
 #include "plumb/points/point_pose.h"
 
 namespace plumb::tools {
+namespace {
+
+/// Moves points into the ideal image; those that have no place there go, from both lists.
+void RectifyPixels(const Rectifier& rectifier, ImagePoints* points,
+                   std::vector<Eigen::Vector2f>* image_pixels) {
+  size_t count = 0;
+  for (size_t i = 0; i < points->size(); ++i) {
+    const auto ideal = rectifier.ToIdeal(points->pixels[i].cast<double>());
+    if (!ideal) continue;
+    points->pixels[count] = ideal->cast<float>();
+    (*image_pixels)[count] = (*image_pixels)[i];
+    points->descriptors[count++] = points->descriptors[i];
+  }
+  points->pixels.resize(count);
+  points->descriptors.resize(count);
+  image_pixels->resize(count);
+}
+
+}  // namespace
 
 Status PointFrontEnd::Extract(const cv::Mat& image) {
   cv::cvtColor(image, gray_, cv::COLOR_BGR2GRAY);
@@ -18,27 +38,31 @@ Status PointFrontEnd::Extract(const cv::Mat& image) {
 }
 
 Result<std::vector<MapPoint>> PointFrontEnd::KeyFramePoints(const cv::Mat& image,
-                                                            const Camera& camera,
+                                                            const Rectifier& rectifier,
                                                             const Rigid3& cam_from_world,
                                                             const DepthView& depth) {
   if (const Status extracted = Extract(image); !extracted) return extracted.error();
-  return LiftPoints(points_, camera, cam_from_world, depth);
+  return LiftPoints(points_, rectifier, cam_from_world, depth);
 }
 
 Result<std::vector<PointMatch>> PointFrontEnd::QueryMatches(const cv::Mat& image,
-                                                            const Camera& camera,
+                                                            const Rectifier& rectifier,
                                                             const MapIndex& index,
                                                             const Rigid3& prior_cam_from_world,
                                                             RefineMethod method) {
   if (const Status extracted = Extract(image); !extracted) return extracted.error();
+  image_pixels_ = points_.pixels;
+  if (!rectifier.IsIdentity()) RectifyPixels(rectifier, &points_, &image_pixels_);
   matcher_.Match(points_, index, prior_cam_from_world, &correspondences_);
   std::vector<PointMatch> matches;
   const auto add = [&](const PointCorrespondence& c) {
-    matches.push_back({c.pixel, c.point_in_world, c.deviation_in_world});
+    matches.push_back(
+        {image_pixels_[c.image_point].cast<double>(), c.point_in_world, c.deviation_in_world});
   };
   if (method == RefineMethod::kSearch) {
     for (const PointCorrespondence& c : correspondences_) add(c);
-  } else if (const std::optional<PointPose> pose = EstimatePointPose(camera, correspondences_)) {
+  } else if (const std::optional<PointPose> pose =
+                 EstimatePointPose(rectifier.ideal(), correspondences_)) {
     for (const uint32_t inlier : pose->inliers) add(correspondences_[inlier]);
   }
   return matches;

@@ -5,7 +5,7 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/map/depth_view.h"
 #include "plumb/map/map_index.h"
@@ -20,13 +20,14 @@ class PointFrontEnd {
  public:
   /// Points of a key frame that have depth.
   /// @param image  8-bit BGR.
-  Result<std::vector<MapPoint>> KeyFramePoints(const cv::Mat& image, const Camera& camera,
+  Result<std::vector<MapPoint>> KeyFramePoints(const cv::Mat& image, const Rectifier& rectifier,
                                                const Rigid3& cam_from_world,
                                                const DepthView& depth);
 
   /// 2D-3D matches of a query image with the key frames near its prior: all of them for the search,
-  /// which drops those that do not fit the lines' pose, else the inliers of PnP-RANSAC.
-  Result<std::vector<PointMatch>> QueryMatches(const cv::Mat& image, const Camera& camera,
+  /// which drops those that do not fit the lines' pose, else the inliers of PnP-RANSAC. Pixels are
+  /// those of the image.
+  Result<std::vector<PointMatch>> QueryMatches(const cv::Mat& image, const Rectifier& rectifier,
                                                const MapIndex& index,
                                                const Rigid3& prior_cam_from_world,
                                                RefineMethod method);
@@ -38,6 +39,7 @@ class PointFrontEnd {
   PointMatcher matcher_;
   cv::Mat gray_;
   ImagePoints points_;
+  std::vector<Eigen::Vector2f> image_pixels_;  // of points_, before they moved to the ideal image
   std::vector<PointCorrespondence> correspondences_;
 };
 

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "plumb/features/segment_refiner.h"
+#include "plumb/features/straighten.h"
+#include "plumb/runtime/rectify_points.h"
 #include "tools/datasets/image_file.h"
 #include "tools/datasets/line_annotations.h"
 #include "tools/plumbline/console.h"
@@ -64,17 +66,20 @@ Outcome ReadQueries(FrameRun* run, const std::string& segments_path, size_t limi
       if (segments_path.empty()) {
         Result<std::vector<Segment2>> found = run->detector->Detect(ViewOf(*image));
         if (!found) return FailureFrom(found.error());
-        query.segments = refiner.Refine(ViewOf(*image), *found);
+        query.segments = refiner.Refine(ViewOf(*image), *found, &run->sequence.rectifier);
       }
       if (run->with_points) {
         Result<std::vector<PointMatch>> matches =
-            points.QueryMatches(*image, run->sequence.camera, *run->index,
+            points.QueryMatches(*image, run->sequence.rectifier, *run->index,
                                 query.prior.cam_from_world, run->session.refiner.method);
         if (!matches) return FailureFrom(matches.error());
         query.points = *std::move(matches);
+        RectifyPoints(run->sequence.rectifier, &query.points);
       }
     }
-    if (!segments_path.empty()) query.segments = std::move(known[i]);
+    if (!segments_path.empty()) {
+      query.segments = StraightenSegments(run->sequence.rectifier, std::move(known[i]));
+    }
     progress.Advance();
   }
   return std::nullopt;

@@ -66,8 +66,8 @@ class ReplayWriter {
   Outcome WriteOverlay(size_t index, const FrameResult& result) {
     const Result<cv::Mat> image = ReadColorImage(run_.frames[index].color_path);
     if (!image) return FailureFrom(image.error());
-    const cv::Mat picture =
-        DrawOverlay(*image, options_.overlay_brightness, run_.sequence.camera, *run_.index, result);
+    const cv::Mat picture = DrawOverlay(*image, options_.overlay_brightness,
+                                        run_.sequence.rectifier, *run_.index, result);
     std::vector<uint8_t> png;
     cv::imencode(".png", picture, png);
     return out_->Write("overlay-" + FormatTimestamp(result.timestamp_ns) + ".png",

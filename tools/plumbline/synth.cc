@@ -1,6 +1,7 @@
 // plumbline synth: a rendered room as a posed RGB-D sequence.
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
@@ -13,11 +14,19 @@ namespace {
 
 struct SynthOptions {
   synth::SequenceOptions sequence;
+  std::string camera_model = "PINHOLE";
+  std::vector<double> distortion;
   std::string out;
   bool json = false;
 };
 
-Outcome RunSynth(const SynthOptions& options) {
+Outcome RunSynth(SynthOptions options) {
+  const LensModel model = options.camera_model == "RADTAN"           ? LensModel::kRadTan
+                          : options.camera_model == "KANNALA_BRANDT" ? LensModel::kKannalaBrandt
+                                                                     : LensModel::kNone;
+  const Result<Lens> lens = MakeLens(model, options.distortion);
+  if (!lens) return Failure{kExitUsage, "--distortion: " + lens.error().message};
+  options.sequence.lens = *lens;
   if (const Status valid = options.sequence.Validate(); !valid) {
     return Failure{kExitUsage, valid.error().message};
   }
@@ -54,6 +63,16 @@ void AddSynth(CLI::App& program, PendingRun& pending) {
         command.add_option("--width", s.width_px, "Image width [px]")->capture_default_str();
         command.add_option("--height", s.height_px, "Image height [px]")->capture_default_str();
         command.add_option("--focal", s.focal_px, "Focal length [px]")->capture_default_str();
+        command.add_option("--camera-model", options.camera_model, "Lens of the camera")
+            ->check(CLI::IsMember({"PINHOLE", "RADTAN", "KANNALA_BRANDT"}))
+            ->capture_default_str();
+        command
+            .add_option(
+                "--distortion", options.distortion,
+                "Its coefficients, separated by commas: RADTAN k1,k2,p1,p2[,k3[,k4,k5,k6]], "
+                "KANNALA_BRANDT k1,k2,k3,k4")
+            ->delimiter(',')
+            ->expected(1, 8);
         command.add_option("--sweep", s.sweep_deg, "Turn of the camera in all [deg]")
             ->capture_default_str();
         command
@@ -73,7 +92,8 @@ void AddSynth(CLI::App& program, PendingRun& pending) {
             "Examples:\n"
             "  plumbline synth --out room --seed 2 --frames 48\n"
             "  plumbline synth --out tiny --frames 6 --width 320 --height 240 --samples 1\n"
-            "  plumbline synth --out noisy --depth-noise 0.002 --image-noise 4");
+            "  plumbline synth --out noisy --depth-noise 0.002 --image-noise 4\n"
+            "  plumbline synth --out barrel --camera-model RADTAN --distortion=-0.3,0.1,0,0");
       },
       RunSynth);
 }

@@ -119,10 +119,12 @@ uint8_t ToByte(double linear, double noise) {
 /// Direction in the world of the ray through a pixel, with unit depth.
 struct PixelRays {
   Eigen::Matrix3d world_from_cam;
-  const Camera& camera;
+  const Rectifier& rectifier;
 
-  Eigen::Vector3d Direction(double x, double y) const {
-    const Eigen::Vector2d n = camera.Normalize({x, y});
+  std::optional<Eigen::Vector3d> Direction(double x, double y) const {
+    const std::optional<Eigen::Vector2d> ideal = rectifier.ToIdeal({x, y});
+    if (!ideal) return std::nullopt;
+    const Eigen::Vector2d n = rectifier.ideal().Normalize(*ideal);
     return world_from_cam * Eigen::Vector3d(n.x(), n.y(), 1.0);
   }
 };
@@ -137,17 +139,19 @@ void RenderRow(const Scene& scene, const PixelRays& rays, const Eigen::Vector3d&
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     for (int sample = 0; sample < n * n; ++sample) {
       const double dx = (sample % n + 0.5) / n - 0.5, dy = (sample / n + 0.5) / n - 0.5;
-      const Eigen::Vector3d direction = rays.Direction(x + dx, y + dy);
-      const Hit hit = Cast(scene, centre, direction);
+      const std::optional<Eigen::Vector3d> direction = rays.Direction(x + dx, y + dy);
+      if (!direction) continue;
+      const Hit hit = Cast(scene, centre, *direction);
       if (hit.material != nullptr)
-        sum += Shade(scene, centre + hit.t * direction, hit, options.shadows);
+        sum += Shade(scene, centre + hit.t * *direction, hit, options.shadows);
     }
     sum /= static_cast<float>(n * n);
     for (int channel = 0; channel < 3; ++channel) {
       const double noise = options.noise_grey_levels * random.Normal();
       image->bgr[3 * pixel + static_cast<size_t>(channel)] = ToByte(sum[2 - channel], noise);
     }
-    const Hit at_centre = Cast(scene, centre, rays.Direction(x, y));
+    const std::optional<Eigen::Vector3d> direction = rays.Direction(x, y);
+    const Hit at_centre = direction ? Cast(scene, centre, *direction) : Hit{};
     image->depth_m[pixel] = at_centre.material != nullptr ? static_cast<float>(at_centre.t) : 0.0f;
   }
 }
@@ -161,8 +165,9 @@ std::optional<double> CastRay(const Scene& scene, const Eigen::Vector3d& origin,
   return hit.t;
 }
 
-RgbdImage Render(const Scene& scene, const Camera& camera, const Rigid3& cam_from_world,
+RgbdImage Render(const Scene& scene, const Rectifier& rectifier, const Rigid3& cam_from_world,
                  const RenderOptions& options) {
+  const Camera& camera = rectifier.image_camera().pinhole;
   RgbdImage image;
   image.width_px = camera.width_px;
   image.height_px = camera.height_px;
@@ -170,7 +175,7 @@ RgbdImage Render(const Scene& scene, const Camera& camera, const Rigid3& cam_fro
       static_cast<size_t>(camera.width_px) * static_cast<size_t>(camera.height_px);
   image.bgr.resize(3 * pixels);
   image.depth_m.resize(pixels);
-  const PixelRays rays{cam_from_world.Inverse().RotationMatrix(), camera};
+  const PixelRays rays{cam_from_world.Inverse().RotationMatrix(), rectifier};
   const Eigen::Vector3d centre = cam_from_world.Center();
   const int num_threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   std::vector<std::jthread> threads;

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
 #include "tools/synth/scene.h"
@@ -26,8 +26,9 @@ struct RgbdImage {
   std::vector<float> depth_m;  // [height][width]
 };
 
-/// Renders on all cores; the result does not depend on their number.
-RgbdImage Render(const Scene& scene, const Camera& camera, const Rigid3& cam_from_world,
+/// Renders on all cores; the result does not depend on their number. Pixels that no ray reaches
+/// through the lens stay black and without depth.
+RgbdImage Render(const Scene& scene, const Rectifier& rectifier, const Rigid3& cam_from_world,
                  const RenderOptions& options);
 
 /// Distance [m] along the ray origin + t * direction to the first surface, in units of
@@ -36,7 +37,8 @@ std::optional<double> CastRay(const Scene& scene, const Eigen::Vector3d& origin,
                               const Eigen::Vector3d& direction);
 
 /// The parts of `edge_in_world` that the camera sees: inside the image, in front, not hidden (to
-/// 1/64 of the edge's visible length), longer than `min_length_px`.
+/// 1/64 of the edge's visible length), longer than `min_length_px`. Without a lens: for one, give
+/// its ideal camera.
 std::vector<Segment2> VisibleParts(const Scene& scene, const Camera& camera,
                                    const Rigid3& cam_from_world, const Segment3& edge_in_world,
                                    double min_length_px);

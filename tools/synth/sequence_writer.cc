@@ -13,10 +13,12 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "plumb/base/file.h"
-#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
+#include "tools/datasets/camera_file.h"
 #include "tools/datasets/timestamp.h"
 #include "tools/datasets/trajectory.h"
 #include "tools/synth/camera_path.h"
+#include "tools/synth/curve_chords.h"
 #include "tools/synth/render.h"
 #include "tools/synth/room.h"
 
@@ -77,15 +79,20 @@ class EdgeRecord {
  public:
   explicit EdgeRecord(const Scene& scene) : edges_(EdgesOf(scene)), seen_(edges_.size(), false) {}
 
-  void Add(const Scene& scene, const Camera& camera, const Rigid3& pose, const std::string& file) {
+  void Add(const Scene& scene, const Rectifier& rectifier, const Rigid3& pose,
+           const std::string& file) {
+    const Camera& camera = rectifier.image_camera().pinhole;
     nlohmann::json lines = nlohmann::json::array();
     for (size_t i = 0; i < edges_.size(); ++i) {
-      for (const Segment2& part : VisibleParts(scene, camera, pose, edges_[i], kMinAnnotatedPx)) {
-        seen_[i] = true;
-        nlohmann::json line = nlohmann::json::array();
-        for (const double v : {part.start.x(), part.start.y(), part.end.x(), part.end.y()})
-          line.push_back(std::round(100.0 * v) / 100.0);
-        lines.push_back(std::move(line));
+      for (const Segment2& part :
+           VisibleParts(scene, rectifier.ideal(), pose, edges_[i], kMinAnnotatedPx)) {
+        for (const Segment2& chord : ChordsInImage(rectifier, part, kMinAnnotatedPx)) {
+          seen_[i] = true;
+          nlohmann::json line = nlohmann::json::array();
+          for (const double v : {chord.start.x(), chord.start.y(), chord.end.x(), chord.end.y()})
+            line.push_back(std::round(100.0 * v) / 100.0);
+          lines.push_back(std::move(line));
+        }
       }
     }
     annotations_.push_back({{"filename", file},
@@ -202,6 +209,9 @@ Status WriteSequence(const SequenceOptions& options, const std::string& director
   camera.cx = 0.5 * (options.width_px - 1);
   camera.cy = 0.5 * (options.height_px - 1);
 
+  Result<Rectifier> created = Rectifier::Create({camera, options.lens});
+  if (!created) return created.error();
+  const Rectifier& rectifier = *created;
   EdgeRecord edges(scene);
   std::vector<StampedPose> truth;
   std::string rgb_list = "# timestamp filename\n", depth_list = rgb_list;
@@ -212,7 +222,7 @@ Status WriteSequence(const SequenceOptions& options, const std::string& director
     render.shadows = options.shadows;
     render.noise_grey_levels = options.image_noise;
     render.noise_seed = options.seed * 1000003 + static_cast<uint64_t>(frame);
-    RgbdImage image = Render(scene, camera, pose, render);
+    RgbdImage image = Render(scene, rectifier, pose, render);
 
     const std::string rgb = FrameName(frame, options.png ? "png" : "jpg");
     const std::string depth = FrameName(frame, "png");
@@ -230,23 +240,16 @@ Status WriteSequence(const SequenceOptions& options, const std::string& director
     const std::string stamp = FormatTimestamp(truth.back().timestamp_ns);
     rgb_list += stamp + " rgb/" + rgb + "\n";
     depth_list += stamp + " depth/" + depth + "\n";
-    edges.Add(scene, camera, pose, rgb);
+    edges.Add(scene, rectifier, pose, rgb);
     if (progress) progress(frame + 1, options.num_frames);
   }
 
-  const nlohmann::ordered_json camera_json = {
-      {"model", "PINHOLE"},
-      {"width", camera.width_px},
-      {"height", camera.height_px},
-      {"fx", camera.fx},
-      {"fy", camera.fy},
-      {"cx", camera.cx},
-      {"cy", camera.cy},
-      {"depth_scale", kDepthUnitsPerMetre},
-      {"source", "rendered by plumbline synth, seed " + std::to_string(options.seed)}};
+  const std::string camera_json =
+      tools::FormatCameraFile({rectifier.image_camera(), kDepthUnitsPerMetre},
+                              "rendered by plumbline synth, seed " + std::to_string(options.seed));
   for (const auto& [name, text] : {std::pair<const char*, std::string>{"rgb.txt", rgb_list},
                                    {"depth.txt", depth_list},
-                                   {"camera.json", camera_json.dump(1) + "\n"},
+                                   {"camera.json", camera_json},
                                    {"lines3d.txt", edges.SeenEdgesText()},
                                    {"annotations.json", edges.AnnotationsJson()}}) {
     if (const Status written = WriteFileAtomically(root / name, text); !written)

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "plumb/base/result.h"
+#include "plumb/geometry/lens.h"
 
 namespace plumb::synth {
 
@@ -16,6 +17,7 @@ struct SequenceOptions {
   int width_px = 640;        // 64..4096
   int height_px = 480;       // 64..4096
   double focal_px = 525.0;   // > 0
+  Lens lens;                 // of the camera; the principal point is the image's middle
   double sweep_deg = 120.0;  // turn of the camera over the sequence, 0..3600
   double depth_noise =
       0.0;  // standard deviation [m] at 1 m, grows with the square of the depth; >= 0
@@ -32,7 +34,8 @@ struct SequenceOptions {
 ///   rgb/ depth/ rgb.txt depth.txt camera.json groundtruth.txt   depth in millimetres
 ///   splits/map.txt query.txt prior_p02.txt .. prior_p40.txt prior_drift.txt
 ///   lines3d.txt        exact 3D edges that some frame sees: x1 y1 z1 x2 y2 z2 [m]
-///   annotations.json   their visible parts in every image, for `eval lines` (with images = rgb/)
+///   annotations.json   their visible parts in every image, for `eval lines` (with images = rgb/);
+///                      with a lens, chords that are within 0.5 px of their curves
 ///
 /// prior_pXX: the truth moved by exactly XX cm and 0.5, 1, 2, 4 or 8 deg; prior_drift: a tracker
 /// that is never corrected.

@@ -159,6 +159,16 @@ typedef struct plumb_vulkan_host {
   uint32_t reserved; /* 0 */
 } plumb_vulkan_host;
 
+/* plumb_session_options.tile_columns and tile_rows. */
+enum { PLUMB_TILES_AUTO = -1 };
+
+/* Bits of plumb_session_options.edge_flags. */
+enum {
+  PLUMB_EDGE_KEEP_ENDS = 1,      /* segments are not cut to where their edge is */
+  PLUMB_EDGE_ONE_BORDER = 2,     /* other borders of bars and thin lines are not added */
+  PLUMB_EDGE_KEEP_DUPLICATES = 4 /* of several segments on one edge, all stay */
+};
+
 struct plumb_frame_result;
 typedef void (*plumb_result_callback)(const struct plumb_frame_result* result, void* user);
 
@@ -191,6 +201,19 @@ typedef struct plumb_session_options {
    * during the call. May submit frames under PLUMB_POLICY_NEWEST only. */
   plumb_result_callback on_result;
   void* on_result_user;
+  /* What the detector returns. A map's segments were found with its own settings: change these when
+   * the camera or the scene asks for it. */
+  double score_threshold; /* drops segments with a lower score, 0..1; 0: as the model says */
+  double min_length_px;   /* drops shorter ones, 0..100000; 0: none */
+  double structural_nms;  /* drops segments whose ends are near a better one's: squared distances in
+                             an image of 128 x 128, 0..100000; 2 is usual, 0: off */
+  uint32_t top_k; /* at most so many, the best, 1..4096, of each tile; 0: as the model says */
+  /* Overlapping tiles for images much larger than the network's input, 1..64 each way; both 0: the
+   * whole image at once; both PLUMB_TILES_AUTO: as many as the input's size asks for. */
+  int32_t tile_columns, tile_rows;
+  /* How segments are moved on to the image's edges. */
+  uint32_t edge_flags;       /* PLUMB_EDGE_* bits */
+  double edge_min_length_px; /* drops shorter ones, before and after, 1..100000; 0: 12 */
 } plumb_session_options;
 
 PLUMB_API plumb_result plumb_session_create(const plumb_session_options* options,
@@ -221,6 +244,16 @@ enum {
   PLUMB_POSE_GL_WORLD_FROM_CAM = 4
 };
 
+/* The lens. A ray (X, Y, Z) meets the plane z = 1 at x = X / Z, y = Y / Z; the lens moves that to
+ * (x', y'), and the pixel is (fx x' + cx, fy y' + cy). Coefficients in OpenCV's order, the rest 0.
+ */
+enum {
+  PLUMB_LENS_NONE = 0,
+  PLUMB_LENS_RADTAN = 1,        /* k1 k2 p1 p2 k3 k4 k5 k6 of OpenCV's calib3d; with 4 or 5
+                                   coefficients, the others are 0 */
+  PLUMB_LENS_KANNALA_BRANDT = 2 /* k1 k2 k3 k4 of OpenCV's fisheye module */
+};
+
 enum {
   PLUMB_UNCERTAINTY_SIZES = 0,     /* prior_position_sigma_m, prior_rotation_sigma_rad */
   PLUMB_UNCERTAINTY_COVARIANCE = 1 /* prior_covariance */
@@ -234,7 +267,7 @@ typedef struct plumb_frame {
   uint32_t width_px, height_px;
   const uint8_t* planes[3];
   int64_t row_stride_bytes[3];
-  double fx, fy, cx, cy;     /* pinhole, undistorted [px] */
+  double fx, fy, cx, cy;     /* of the image as it is, with the lens below [px] */
   int64_t timestamp_ns;      /* of the caller's clock; strictly increasing within a session */
   uint64_t user_tag;         /* comes back in the result */
   int32_t pose_convention;   /* PLUMB_POSE_*; required */
@@ -245,7 +278,8 @@ typedef struct plumb_frame {
    * stream mode: of the tracker's drift. */
   double prior_position_sigma_m, prior_rotation_sigma_rad;
   double prior_covariance[36]; /* positive semi-definite; only its size counts today */
-  /* Optional 2D-3D correspondences: x, y [px]; x, y, z in the world [m]; and, or NULL, one standard
+  /* Optional 2D-3D correspondences: x, y [px of the image as it is; those that the lens cannot have
+   * imaged are left out]; x, y, z in the world [m]; and, or NULL, one standard
    * deviation of each point along the ray of the camera that made it, as a vector in the world [m].
    */
   const double* points_px;
@@ -257,6 +291,9 @@ typedef struct plumb_frame {
    * happens exactly once for every accepted frame, at the latest in plumb_session_destroy. */
   void (*release)(void* user);
   void* release_user;
+  int32_t lens_model;        /* PLUMB_LENS_* */
+  uint32_t reserved_lens;    /* 0 */
+  double lens_distortion[8]; /* see PLUMB_LENS_RADTAN */
 } plumb_frame;
 
 /* Every accepted frame gives exactly one result, in the order of submission.

@@ -46,6 +46,41 @@ Result<PixelFormat> FormatFromAbi(int32_t format) {
   }
 }
 
+Result<Lens> LensFromAbi(const plumb_frame& frame) {
+  if (frame.reserved_lens != 0) return Invalid("frame.reserved_lens is not zero");
+  Lens lens;
+  size_t num_coefficients = 0;
+  switch (frame.lens_model) {
+    case PLUMB_LENS_NONE:
+      break;
+    case PLUMB_LENS_RADTAN:
+      lens.model = LensModel::kRadTan;
+      num_coefficients = 8;
+      break;
+    case PLUMB_LENS_KANNALA_BRANDT:
+      lens.model = LensModel::kKannalaBrandt;
+      num_coefficients = 4;
+      break;
+    default:
+      return Invalid("frame.lens_model " + std::to_string(frame.lens_model) +
+                     " is not a PLUMB_LENS");
+  }
+  for (size_t i = 0; i < lens.coefficients.size(); ++i) {
+    const double value = frame.lens_distortion[i];
+    const auto wrong = [&](const std::string& why) {
+      return Invalid("frame.lens_distortion[" + std::to_string(i) + "] " + std::to_string(value) +
+                     why);
+    };
+    if (!std::isfinite(value)) return wrong(" is not finite");
+    if (i >= num_coefficients && value != 0.0) {
+      return wrong(" is not 0, which frame.lens_model " + std::to_string(frame.lens_model) +
+                   " does not use");
+    }
+    lens.coefficients[i] = value;
+  }
+  return lens;
+}
+
 Result<PosePrior> PriorFromAbi(const plumb_frame& frame) {
   PosePrior prior;
   Result<Rigid3> pose = PoseFromAbi(frame.pose_convention, frame.prior_q_xyzw, frame.prior_t_m);
@@ -168,7 +203,11 @@ Result<SessionFrame> FrameFromAbi(const plumb_frame& frame, std::vector<PointMat
   for (size_t i = 0; i < 3; ++i) {
     out.image.planes[i] = {frame.planes[i], frame.row_stride_bytes[i]};
   }
-  out.camera = {frame.fx, frame.fy, frame.cx, frame.cy, out.image.width_px, out.image.height_px};
+  out.camera.pinhole = {frame.fx, frame.fy,           frame.cx,
+                        frame.cy, out.image.width_px, out.image.height_px};
+  const Result<Lens> lens = LensFromAbi(frame);
+  if (!lens) return lens.error();
+  out.camera.lens = *lens;
   out.timestamp_ns = frame.timestamp_ns;
   out.user_tag = frame.user_tag;
   out.user_kind = static_cast<uint32_t>(frame.pose_convention);
@@ -276,6 +315,22 @@ Result<SessionOptions> OptionsFromAbi(const plumb_session_options& options) {
                    " is above 4096");
   }
   if (options.max_segments != 0) out.segments.max_count = options.max_segments;
+  constexpr uint32_t kEdgeFlags =
+      PLUMB_EDGE_KEEP_ENDS | PLUMB_EDGE_ONE_BORDER | PLUMB_EDGE_KEEP_DUPLICATES;
+  if ((options.edge_flags & ~kEdgeFlags) != 0) {
+    return Invalid("options.edge_flags " + std::to_string(options.edge_flags) +
+                   " has bits that are no PLUMB_EDGE");
+  }
+  out.segments.trim = (options.edge_flags & PLUMB_EDGE_KEEP_ENDS) == 0;
+  out.segments.add_other_borders = (options.edge_flags & PLUMB_EDGE_ONE_BORDER) == 0;
+  out.segments.remove_duplicates = (options.edge_flags & PLUMB_EDGE_KEEP_DUPLICATES) == 0;
+  if (options.edge_min_length_px != 0.0) {
+    if (!(options.edge_min_length_px >= 1.0 && options.edge_min_length_px <= 1e5)) {
+      return Invalid("options.edge_min_length_px " + std::to_string(options.edge_min_length_px) +
+                     " is outside 1..100000");
+    }
+    out.segments.min_length_px = options.edge_min_length_px;
+  }
   if (options.result_capacity != 0) out.result_capacity = options.result_capacity;
   out.deadline_ns = options.deadline_ns;
   out.submit_timeout_ns = options.submit_timeout_ns;

@@ -11,6 +11,7 @@
 
 #include "abi/versioned_struct.h"
 #include "plumb/base/log.h"
+#include "plumb/features/configured_detector.h"
 #include "plumb/features/detector_factory.h"
 #include "plumb/features/vlse_detector.h"
 #include "plumb/gpu/device.h"
@@ -78,6 +79,67 @@ Result<std::shared_ptr<gpu::Device>> OpenDevice(const plumb_session_options& opt
   return gpu::Device::Create(device_options);
 }
 
+// What is asked of any detector. A network has the score threshold and the number of segments in
+// its own decoder (`vlse`); LSD has neither.
+Result<DetectionOptions> DetectionFromAbi(const plumb_session_options& options, bool is_lsd,
+                                          VlseDetectorOptions* vlse) {
+  const auto invalid = [](const std::string& name, const std::string& value,
+                          const char* range) -> Error {
+    return {ErrorCode::kInvalidArgument, "options." + name + " " + value + " is outside " + range};
+  };
+  const auto check = [&](const char* name, double value, double high, const char* range) -> Status {
+    if (value >= 0.0 && value <= high) return Ok();  // false for NaN
+    return invalid(name, std::to_string(value), range);
+  };
+  for (const Status& status : {check("score_threshold", options.score_threshold, 1.0, "0..1"),
+                               check("min_length_px", options.min_length_px, 1e5, "0..100000"),
+                               check("structural_nms", options.structural_nms, 1e5, "0..100000"),
+                               check("top_k", options.top_k, 4096.0, "0..4096")}) {
+    if (!status) return status.error();
+  }
+  DetectionOptions detection;
+  detection.selection.min_length_px = options.min_length_px;
+  detection.selection.structural_nms = options.structural_nms;
+  if (is_lsd) {
+    detection.selection.min_score = options.score_threshold;
+    detection.selection.max_count = options.top_k;
+  } else {
+    if (options.score_threshold != 0.0) {
+      vlse->score_threshold = static_cast<float>(options.score_threshold);
+    }
+    if (options.top_k != 0) vlse->max_lines = static_cast<int>(options.top_k);
+  }
+  const int32_t columns = options.tile_columns, rows = options.tile_rows;
+  const auto in_range = [](int32_t count) { return count >= 1 && count <= 64; };
+  if (columns == PLUMB_TILES_AUTO && rows == PLUMB_TILES_AUTO) {
+    detection.tiles = {0, 0};
+  } else if (in_range(columns) && in_range(rows)) {
+    detection.tiles = {columns, rows};
+  } else if (columns != 0 || rows != 0) {
+    return invalid("tile_columns and tile_rows",
+                   std::to_string(columns) + " x " + std::to_string(rows),
+                   "1..64 (or both 0, or both PLUMB_TILES_AUTO)");
+  }
+  return detection;
+}
+
+Result<std::unique_ptr<LineDetector>> CreateUnconfigured(const plumb_session_options& options,
+                                                         const std::string& model,
+                                                         VlseDetectorOptions vlse) {
+  if (options.model_data == nullptr && model == "lsd") return CreateLineDetector(model, vlse);
+  Result<std::shared_ptr<gpu::Device>> device = OpenDevice(options);
+  if (!device) return device.error();
+  Log((*device)->Info().IsSoftware() ? LogLevel::kWarning : LogLevel::kInfo,
+      "device: " + gpu::Describe((*device)->Info()));
+  vlse.device = *std::move(device);
+  if (options.model_data == nullptr) return CreateLineDetector(model, vlse, ModelFolders());
+  vlse.model_data = std::span(static_cast<const std::byte*>(options.model_data),
+                              static_cast<size_t>(options.model_size_bytes));
+  Result<std::unique_ptr<VlseDetector>> detector = VlseDetector::Create(vlse);
+  if (!detector) return detector.error();
+  return std::unique_ptr<LineDetector>(*std::move(detector));
+}
+
 }  // namespace
 
 Result<std::unique_ptr<LineDetector>> CreateDetector(const plumb_session_options& options,
@@ -96,19 +158,12 @@ Result<std::unique_ptr<LineDetector>> CreateDetector(const plumb_session_options
   }
   const std::string model = options.model != nullptr ? options.model : map_detector;
   VlseDetectorOptions vlse;
-  if (options.model_data == nullptr && model == "lsd") return CreateLineDetector(model, vlse);
-
-  Result<std::shared_ptr<gpu::Device>> device = OpenDevice(options);
-  if (!device) return device.error();
-  Log((*device)->Info().IsSoftware() ? LogLevel::kWarning : LogLevel::kInfo,
-      "device: " + gpu::Describe((*device)->Info()));
-  vlse.device = *std::move(device);
-  if (options.model_data == nullptr) return CreateLineDetector(model, vlse, ModelFolders());
-  vlse.model_data = std::span(static_cast<const std::byte*>(options.model_data),
-                              static_cast<size_t>(options.model_size_bytes));
-  Result<std::unique_ptr<VlseDetector>> detector = VlseDetector::Create(vlse);
+  const bool is_lsd = options.model_data == nullptr && model == "lsd";
+  const Result<DetectionOptions> detection = DetectionFromAbi(options, is_lsd, &vlse);
+  if (!detection) return detection.error();
+  Result<std::unique_ptr<LineDetector>> detector = CreateUnconfigured(options, model, vlse);
   if (!detector) return detector.error();
-  return std::unique_ptr<LineDetector>(*std::move(detector));
+  return ConfigureDetector(*std::move(detector), *detection);
 }
 
 }  // namespace plumb::abi

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "plumb/features/blurred_image.h"
 #include "plumb/features/luminance.h"
 #include "plumb/features/segment_ridge.h"
+#include "plumb/features/straighten.h"
 
 namespace plumb {
 namespace {
@@ -14,6 +16,7 @@ namespace {
 constexpr uint32_t kMaxSegments = 4096;
 // Beyond this a coordinate cannot belong to an image (16384 px a side) and would only cost digits.
 constexpr double kMaxCoordinatePx = 1e5;
+constexpr double kMaxBendPx = 1.0;  // a ridge within it is found from either line
 
 bool IsUsable(const Segment2& segment) {
   // Written so that NaN fails.
@@ -63,9 +66,17 @@ struct SegmentRefiner::Impl {
   std::vector<uint8_t> gray;
   std::vector<Segment2> candidates;
   std::vector<KeptSegment> kept;
+  const Rectifier* rectifier = nullptr;  // of the image at hand, if it has a lens
 
   bool IsLongEnough(const Segment2& segment) const {
     return segment.Length() > options.min_length_px;
+  }
+
+  // The same for a refined segment, which a lens images with another length.
+  bool IsLongEnoughInImage(const Segment2& segment) const {
+    if (rectifier == nullptr) return IsLongEnough(segment);
+    const auto start = rectifier->ToImage(segment.start), end = rectifier->ToImage(segment.end);
+    return start && end && IsLongEnough({start->px, end->px});
   }
 
   void SelectCandidates(std::span<const Segment2> segments) {
@@ -85,23 +96,38 @@ struct SegmentRefiner::Impl {
     candidates.resize(std::min(count, candidates.size()));
   }
 
+  // Into the ideal image. Where the edge's curve is bent by more than kMaxBendPx, the image tells
+  // which points of it the detector met.
+  bool Straighten(Segment2* segment) const {
+    const auto straight = StraightenSegment(*rectifier, *segment);
+    if (!straight) return false;
+    *segment = straight->nearest;
+    const double bend = (straight->nearest.Midpoint() - straight->through_ends.Midpoint()).norm();
+    if (bend > kMaxBendPx && SharedEdgeStrength(blurred, straight->through_ends, rectifier) >
+                                 SharedEdgeStrength(blurred, straight->nearest, rectifier)) {
+      *segment = straight->through_ends;
+    }
+    return true;
+  }
+
   bool MoveOnEdge(Segment2* segment) const {
-    MoveToRidge(blurred, kWideHalfWidthPx, segment);
-    MoveToRidge(blurred, kNarrowHalfWidthPx, segment);
+    if (rectifier != nullptr && !Straighten(segment)) return false;
+    MoveToRidge(blurred, kWideHalfWidthPx, segment, rectifier);
+    MoveToRidge(blurred, kNarrowHalfWidthPx, segment, rectifier);
     return CutToEdge(segment);
   }
 
   bool MoveOnOtherBorder(const Segment2& segment, Segment2* border) const {
-    return FindOtherBorder(blurred, segment, border) &&
-           MoveToRidge(blurred, kNarrowHalfWidthPx, border) && CutToEdge(border);
+    return FindOtherBorder(blurred, segment, border, rectifier) &&
+           MoveToRidge(blurred, kNarrowHalfWidthPx, border, rectifier) && CutToEdge(border);
   }
 
   bool CutToEdge(Segment2* segment) const {
     if (options.trim) {
-      if (!TrimToEdge(blurred, segment)) return false;
-      MoveToRidge(blurred, kNarrowHalfWidthPx, segment);
+      if (!TrimToEdge(blurred, segment, rectifier)) return false;
+      MoveToRidge(blurred, kNarrowHalfWidthPx, segment, rectifier);
     }
-    return IsLongEnough(*segment);
+    return IsLongEnoughInImage(*segment);
   }
 
   // Appends the segment unless duplicates are to go and one that was kept before explains it.
@@ -133,16 +159,18 @@ SegmentRefiner::SegmentRefiner(const SegmentRefinerOptions& options)
 SegmentRefiner::~SegmentRefiner() = default;
 
 std::vector<Segment2> SegmentRefiner::Refine(const ImageView& image,
-                                             std::span<const Segment2> segments) {
+                                             std::span<const Segment2> segments,
+                                             const Rectifier* rectifier) {
   std::vector<Segment2> refined;
-  Refine(image, segments, &refined);
+  Refine(image, segments, &refined, rectifier);
   return refined;
 }
 
 void SegmentRefiner::Refine(const ImageView& image, std::span<const Segment2> segments,
-                            std::vector<Segment2>* out_segments) {
+                            std::vector<Segment2>* out_segments, const Rectifier* rectifier) {
   out_segments->clear();
   if (!image.Validate()) return;
+  impl_->rectifier = rectifier != nullptr && !rectifier->IsIdentity() ? rectifier : nullptr;
   impl_->SelectCandidates(segments);
   if (impl_->candidates.empty()) return;
   impl_->blurred.Assign(Luminance(image, &impl_->gray));

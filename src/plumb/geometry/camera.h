@@ -1,4 +1,4 @@
-// Distortion-free pinhole camera.
+// Distortion-free pinhole camera. A camera with a lens is an ImageCamera (rectifier.h).
 #pragma once
 
 #include <cmath>
@@ -13,6 +13,7 @@ struct Camera {
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
   int width_px = 0, height_px = 0;
 
+  friend bool operator==(const Camera&, const Camera&) = default;
   double MeanFocal() const { return 0.5 * (std::abs(fx) + std::abs(fy)); }
   bool IsValid() const {
     return std::isfinite(fx) && std::isfinite(fy) && std::isfinite(cx) && std::isfinite(cy) &&

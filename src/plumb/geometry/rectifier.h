@@ -19,12 +19,21 @@ struct ImageCamera {
   ImageCamera() = default;
   ImageCamera(const Camera& camera) : pinhole(camera) {}  // one without distortion
   ImageCamera(const Camera& camera, const Lens& with_lens) : pinhole(camera), lens(with_lens) {}
+  friend bool operator==(const ImageCamera&, const ImageCamera&) = default;
 };
 
 /// A place in the image, and how the ideal image is stretched there.
 struct ImagePoint {
   Eigen::Vector2d px;
   Eigen::Matrix2d jacobian;  // of image pixels by ideal pixels; its determinant is positive
+
+  /// Ideal pixels across a line of direction `ideal_unit` for one image pixel across its image: one
+  /// ideal pixel each way is an area of one, areas grow by the determinant, lengths by the
+  /// direction's own growth.
+  double StretchAcross(const Eigen::Vector2d& ideal_unit) const {
+    const double determinant = jacobian(0, 0) * jacobian(1, 1) - jacobian(0, 1) * jacobian(1, 0);
+    return (jacobian * ideal_unit).norm() / determinant;
+  }
 };
 
 /// Everything behind detection works in the ideal image: straight lines are straight in it. It has
@@ -33,6 +42,8 @@ struct ImagePoint {
 /// nothing. Plain data, no allocation.
 class Rectifier {
  public:
+  Rectifier() = default;  // of no camera: identity
+
   /// @return kInvalidArgument for an invalid camera or lens, or when nothing of the image can be
   ///         undistorted.
   static Result<Rectifier> Create(const ImageCamera& camera);

@@ -14,7 +14,7 @@ enum class DepthFormat {
 };
 
 /// Depth along the optical axis (z, not the length of the ray), registered to the colour image: the
-/// same size and pinhole camera. Borrowed: the data must outlive the call that takes the view.
+/// same size, camera and lens. Borrowed: the data must outlive the call that takes the view.
 struct DepthView {
   DepthFormat format = DepthFormat::kFloat;
   const void* data = nullptr;

@@ -74,8 +74,9 @@ Run LongestRun(const ColumnShare& column_share) {
 }  // namespace
 
 std::vector<LiftedPart> LiftSegments(const Camera& camera, const DepthView& depth,
-                                     std::span<const Segment2> segments,
-                                     const LiftOptions& options) {
+                                     std::span<const Segment2> segments, const LiftOptions& options,
+                                     const Rectifier* rectifier) {
+  if (rectifier != nullptr && rectifier->IsIdentity()) rectifier = nullptr;
   std::vector<LiftedPart> lifted;
   lifted.reserve(segments.size());
   for (uint32_t i = 0; i < segments.size(); ++i) {
@@ -83,9 +84,9 @@ std::vector<LiftedPart> LiftSegments(const Camera& camera, const DepthView& dept
     const double length = segment.Length();
     if (!(std::isfinite(length) && length >= options.min_length_px)) continue;
 
-    const std::optional<Owner> owner =
-        FindOwner(FitLiftSide(depth, segment, -1, options),
-                  FitLiftSide(depth, segment, +1, options), options.same_surface_tolerance);
+    const std::optional<Owner> owner = FindOwner(
+        FitLiftSide(depth, segment, -1, options, rectifier),
+        FitLiftSide(depth, segment, +1, options, rectifier), options.same_surface_tolerance);
     if (!owner) continue;
     const Run run = LongestRun(owner->column_share);
     const double u0 = static_cast<double>(run.begin) / kLiftColumns;

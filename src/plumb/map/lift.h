@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/segment.h"
 #include "plumb/map/depth_view.h"
 
@@ -32,12 +33,17 @@ struct LiftedPart {
 /// edge. One side only: taken unless the other is nearer. Then the longest supported run is kept.
 /// Deterministic: the draws are fixed.
 ///
-/// @param depth     Valid, of the camera's size.
-/// @param segments  [px]; those that are too short or not finite are dropped.
+/// @param depth      Valid, of the size of the camera or, with a lens, of the taken image.
+/// @param segments   [px]; those that are too short or not finite are dropped.
+/// @param rectifier  Null or identity: depth and segments share `camera`. Otherwise `camera` and
+/// the segments are
+///                   those of its ideal image, and depth is looked up in the taken image, beside
+///                   the curves that the segments are there.
 /// @return lifted parts in the order of `segments`; at most one for each.
 /// Source: docs/method/association.md.
 std::vector<LiftedPart> LiftSegments(const Camera& camera, const DepthView& depth,
                                      std::span<const Segment2> segments,
-                                     const LiftOptions& options = {});
+                                     const LiftOptions& options = {},
+                                     const Rectifier* rectifier = nullptr);
 
 }  // namespace plumb

@@ -66,16 +66,25 @@ struct SampleLayout {
 
 // Inverse depths of the samples, kNoDepth where there is none. Returns how many there are.
 int Sample(const DepthView& depth, const Segment2& segment, int sign, const LiftOptions& options,
-           Samples* inverse_depth) {
+           const Rectifier* rectifier, Samples* inverse_depth) {
   const Eigen::Vector2d delta = segment.Delta();
-  const Eigen::Vector2d normal = Eigen::Vector2d(-delta.y(), delta.x()).normalized() * sign;
+  Eigen::Vector2d normal = Eigen::Vector2d(-delta.y(), delta.x()).normalized() * sign;
+  if (rectifier != nullptr) {
+    const auto middle = rectifier->ToImage(segment.Midpoint());
+    if (middle) normal *= middle->StretchAcross(delta.normalized());
+  }
   int num_valid = 0;
   for (int column = 0; column < kLiftColumns; ++column) {
     const Eigen::Vector2d on_edge = segment.start + (column + 0.5) / kLiftColumns * delta;
     for (int k = 0; k < kOffsets; ++k) {
-      const Eigen::Vector2d at = on_edge + kOffsetsPx[k] * normal;
+      Eigen::Vector2d at = on_edge + kOffsetsPx[k] * normal;
       float& out = (*inverse_depth)[column * kOffsets + k];
       out = kNoDepth;
+      if (rectifier != nullptr) {
+        const auto in_image = rectifier->ToImage(at);
+        if (!in_image) continue;
+        at = in_image->px;
+      }
       // Compare before rounding: segments may reach far outside the image.
       if (!(at.x() > -0.5 && at.y() > -0.5 && at.x() < depth.width_px - 0.5 &&
             at.y() < depth.height_px - 0.5)) {
@@ -125,7 +134,7 @@ double MedianOfValid(const Samples& inverse_depth, int num_valid) {
 }  // namespace
 
 LiftSide FitLiftSide(const DepthView& depth, const Segment2& segment_px, int sign,
-                     const LiftOptions& options) {
+                     const LiftOptions& options, const Rectifier* rectifier) {
   static const SampleLayout layout;
   const int side = sign > 0 ? 1 : 0;
   const Samples& across = layout.across[side];
@@ -133,7 +142,7 @@ LiftSide FitLiftSide(const DepthView& depth, const Segment2& segment_px, int sig
 
   LiftSide out;
   Samples inverse_depth;
-  const int num_valid = Sample(depth, segment_px, sign, options, &inverse_depth);
+  const int num_valid = Sample(depth, segment_px, sign, options, rectifier, &inverse_depth);
   out.valid_share = static_cast<double>(num_valid) / kSamples;
   out.median_inverse_depth = MedianOfValid(inverse_depth, num_valid);
 

@@ -23,13 +23,14 @@ Status Validate(const KeyFrameInput& frame) {
     return invalid("the pose's quaternion has a norm of " + std::to_string(norm) + ", not 1");
   }
   if (const Status depth = frame.depth.Validate(); !depth) return invalid(depth.error().message);
-  if (frame.depth.width_px != frame.camera.width_px ||
-      frame.depth.height_px != frame.camera.height_px) {
+  const Camera& taken =
+      frame.rectifier != nullptr ? frame.rectifier->image_camera().pinhole : frame.camera;
+  if (frame.depth.width_px != taken.width_px || frame.depth.height_px != taken.height_px) {
     const auto size = [](int width, int height) {
       return std::to_string(width) + " x " + std::to_string(height);
     };
     return invalid("the depth image has " + size(frame.depth.width_px, frame.depth.height_px) +
-                   " px, the camera " + size(frame.camera.width_px, frame.camera.height_px));
+                   " px, the camera " + size(taken.width_px, taken.height_px));
   }
   return Ok();
 }
@@ -52,7 +53,7 @@ Status MapBuilder::AddKeyFrame(KeyFrameInput frame) {
   added.points = std::move(frame.points);
   const Rigid3 world_from_cam = added.cam_from_world.Inverse();
   for (const LiftedPart& part :
-       LiftSegments(frame.camera, frame.depth, frame.segments, options_.lift)) {
+       LiftSegments(frame.camera, frame.depth, frame.segments, options_.lift, frame.rectifier)) {
     added.segments.push_back(
         {part.segment_px,
          {world_from_cam * part.segment_in_cam.start, world_from_cam * part.segment_in_cam.end},

@@ -28,10 +28,11 @@ struct MapBuilderOptions {
 struct KeyFrameInput {
   int64_t timestamp_ns = 0;
   Rigid3 cam_from_world;
-  Camera camera;
-  std::span<const Segment2> segments;  // [px], after SegmentRefiner
-  DepthView depth;                     // registered to the colour image
-  std::vector<MapPoint> points;        // optional, for the point front-end; kept as they are
+  Camera camera;                         // of the segments; with a lens rectifier->ideal()
+  const Rectifier* rectifier = nullptr;  // of a depth image with a lens; borrowed, too
+  std::span<const Segment2> segments;    // [px], after SegmentRefiner
+  DepthView depth;                       // registered to the colour image
+  std::vector<MapPoint> points;          // optional, for the point front-end; kept as they are
 };
 
 /// What became of the segments.

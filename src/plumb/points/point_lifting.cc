@@ -30,7 +30,7 @@ std::optional<double> SmoothDepthAt(const DepthView& depth, const Eigen::Vector2
 
 }  // namespace
 
-std::vector<MapPoint> LiftPoints(const ImagePoints& points, const Camera& camera,
+std::vector<MapPoint> LiftPoints(const ImagePoints& points, const Rectifier& rectifier,
                                  const Rigid3& cam_from_world, const DepthView& depth,
                                  const PointLiftOptions& options) {
   const Rigid3 world_from_cam = cam_from_world.Inverse();
@@ -39,9 +39,11 @@ std::vector<MapPoint> LiftPoints(const ImagePoints& points, const Camera& camera
   for (size_t i = 0; i < points.size(); ++i) {
     const std::optional<double> z = SmoothDepthAt(depth, points.pixels[i], options);
     if (!z) continue;
-    const Eigen::Vector3d ray = camera.Normalize(points.pixels[i].cast<double>()).homogeneous();
+    const auto pixel = rectifier.ToIdeal(points.pixels[i].cast<double>());
+    if (!pixel) continue;
+    const Eigen::Vector3d ray = rectifier.ideal().Normalize(*pixel).homogeneous();
     lifted.push_back(
-        {points.pixels[i], (world_from_cam * (*z * ray)).cast<float>(), points.descriptors[i]});
+        {pixel->cast<float>(), (world_from_cam * (*z * ray)).cast<float>(), points.descriptors[i]});
   }
   return lifted;
 }

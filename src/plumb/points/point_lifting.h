@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/map/depth_view.h"
 #include "plumb/map/line_map.h"
@@ -20,9 +20,10 @@ struct PointLiftOptions {
 };
 
 /// Lifts the points with the depth of their nearest pixel and leaves out those that have none.
-/// @param depth  Valid, of the camera's size.
+/// @param points  of the taken image; what is lifted has its place in the ideal one.
+/// @param depth   Valid, of the taken image's size.
 /// Source: docs/method/association.md 2.11.
-std::vector<MapPoint> LiftPoints(const ImagePoints& points, const Camera& camera,
+std::vector<MapPoint> LiftPoints(const ImagePoints& points, const Rectifier& rectifier,
                                  const Rigid3& cam_from_world, const DepthView& depth,
                                  const PointLiftOptions& options = {});
 

@@ -35,11 +35,13 @@ struct FrameResult {
   uint64_t user_tag = 0;
   uint32_t user_kind = 0;
   FrameOutcome outcome = FrameOutcome::kFailed;
-  Error error;                     // of kFailed
-  bool searched = false;           // the refinement needed a search over the prior's uncertainty
-  PosePrior prior;                 // as submitted
-  RefineResult refined;            // its pose is good whatever the outcome: at worst the prior
-  std::vector<Segment2> segments;  // on the image's edges [px]; RefineResult::matches index them
+  Error error;            // of kFailed
+  bool searched = false;  // the refinement needed a search over the prior's uncertainty
+  PosePrior prior;        // as submitted
+  RefineResult refined;   // its pose is good whatever the outcome: at worst the prior
+  /// On the image's edges [px of the ideal image, that is without the lens]; RefineResult::matches
+  /// index them.
+  std::vector<Segment2> segments;
   StageTimes times;
 };
 

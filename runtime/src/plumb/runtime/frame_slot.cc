@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "plumb/runtime/rectify_points.h"
 #include "plumb/runtime/session.h"
 
 namespace plumb {
@@ -36,15 +37,17 @@ void CopyImage(const ImageView& from, std::vector<uint8_t>* pixels, ImageView* i
 
 }  // namespace
 
-void FrameSlot::Assign(const SessionFrame& frame, int64_t now_ns) {
+void FrameSlot::Assign(const SessionFrame& frame, const Rectifier& frame_rectifier,
+                       int64_t now_ns) {
   ticket.timestamp_ns = frame.timestamp_ns;
   ticket.user_tag = frame.user_tag;
   ticket.user_kind = frame.user_kind;
   ticket.prior = frame.prior;
   ticket.prior.cam_from_world.rotation.normalize();
   ticket.submitted_ns = now_ns;
-  camera = frame.camera;
+  rectifier = frame_rectifier;
   points.assign(frame.points.begin(), frame.points.end());
+  RectifyPoints(rectifier, &points);
   detection = Ok();
   detected.clear();
   release = frame.release;
@@ -66,7 +69,7 @@ Status ValidateFrame(const SessionFrame& frame) {
   };
   constexpr double kMaxQuaternionError = 1e-3;
   if (const Status valid = frame.image.Validate(); !valid) return valid;
-  const Camera& camera = frame.camera;
+  const Camera& camera = frame.camera.pinhole;
   if (!camera.IsValid()) return invalid("camera is not a finite pinhole camera");
   if (camera.width_px != frame.image.width_px || camera.height_px != frame.image.height_px) {
     return invalid("camera is for " + std::to_string(camera.width_px) + " x " +

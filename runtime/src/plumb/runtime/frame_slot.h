@@ -6,7 +6,7 @@
 
 #include "plumb/base/result.h"
 #include "plumb/features/image_view.h"
-#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/segment.h"
 #include "plumb/runtime/pose_refiner.h"
 
@@ -27,9 +27,9 @@ struct FrameTicket {
 /// Slots are recycled: their vectors keep their capacity.
 struct FrameSlot {
   FrameTicket ticket;
-  Camera camera;
-  std::vector<PointMatch> points;
-  ImageView image;  // of `pixels`, or the host's own planes until they are released
+  Rectifier rectifier;             // of the frame's camera
+  std::vector<PointMatch> points;  // in pixels of its ideal image
+  ImageView image;                 // of `pixels`, or the host's own planes until they are released
   std::vector<uint8_t> pixels;
   void (*release)(void* user) = nullptr;
   void* release_user = nullptr;
@@ -40,8 +40,9 @@ struct FrameSlot {
   int64_t detect_begin_ns = 0, detect_end_ns = 0;
 
   /// Takes the frame over; copies the image unless it comes with a release callback. `frame` must
-  /// be valid. Leaves `ticket.index` and `dropped_before` alone.
-  void Assign(const SessionFrame& frame, int64_t now_ns);
+  /// be valid and `frame_rectifier` of its camera. Leaves `ticket.index` and `dropped_before`
+  /// alone.
+  void Assign(const SessionFrame& frame, const Rectifier& frame_rectifier, int64_t now_ns);
 
   /// Gives a borrowed image back, once; does nothing for a copied one.
   void ReleaseImage();

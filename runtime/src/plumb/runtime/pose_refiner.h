@@ -64,7 +64,7 @@ struct PoseRefinerOptions {
 };
 
 struct RefineInput {
-  Camera camera;
+  Camera camera;                       // ideal: segments and points are without a lens
   std::span<const Segment2> segments;  // after RefineSegments
   PosePrior prior;
   std::span<const PointMatch> points;  // optional

@@ -95,7 +95,8 @@ struct Session::Impl {
   ResultQueue results;
   std::atomic<bool> is_device_lost{false};
 
-  std::mutex submit_mutex;  // guards the two below and the order of submissions
+  std::mutex submit_mutex;  // guards the three below and the order of submissions
+  Rectifier rectifier;      // of the last camera: most streams have one
   std::optional<int64_t> last_timestamp_ns;
   uint64_t num_submitted = 0;
 
@@ -118,10 +119,17 @@ Result<SubmitOutcome> Session::Impl::Submit(const SessionFrame& frame) {
                  "SessionFrame: timestamp_ns " + std::to_string(frame.timestamp_ns) +
                      " is not after the last frame's " + std::to_string(*last_timestamp_ns)};
   }
+  if (!(rectifier.image_camera() == frame.camera)) {
+    const Result<Rectifier> created = Rectifier::Create(frame.camera);
+    if (!created) {
+      return Error{ErrorCode::kInvalidArgument, "SessionFrame: camera: " + created.error().message};
+    }
+    rectifier = *created;
+  }
   FrameSlot* slot = queue.BeginPush(options.submit_timeout_ns);
   if (slot == nullptr) return SubmitOutcome::kTimedOut;
   try {
-    slot->Assign(frame, now_ns);
+    slot->Assign(frame, rectifier, now_ns);
   } catch (...) {  // Out of memory: the slot must not be lost.
     slot->release = nullptr;
     queue.Recycle(slot);
@@ -215,12 +223,12 @@ void Session::Impl::FinishFrame(FrameSlot* slot) {
 
 Status Session::Impl::RefineFrame(FrameSlot* slot) {
   const int64_t begin_ns = NowNs();
-  segment_refiner.Refine(slot->image, slot->detected, &result.segments);
+  segment_refiner.Refine(slot->image, slot->detected, &result.segments, &slot->rectifier);
   result.times.ridge_ns = NowNs() - begin_ns;
   slot->ReleaseImage();
 
   RefineInput input;
-  input.camera = slot->camera;
+  input.camera = slot->rectifier.ideal();
   input.segments = result.segments;
   input.prior = slot->ticket.prior;
   input.points = slot->points;

@@ -10,7 +10,7 @@
 #include "plumb/features/image_view.h"
 #include "plumb/features/line_detector.h"
 #include "plumb/features/segment_refiner.h"
-#include "plumb/geometry/camera.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/map/map_index.h"
 #include "plumb/runtime/frame_result.h"
 #include "plumb/runtime/pose_refiner.h"
@@ -54,11 +54,12 @@ struct SessionOptions {
 /// Borrowed for the duration of Submit(), except for the image when `release` is set.
 struct SessionFrame {
   ImageView image;
-  Camera camera;             // of the image's size
+  ImageCamera camera;        // of the image's size, with its lens
   int64_t timestamp_ns = 0;  // strictly increasing within a session
   PosePrior prior;
-  std::span<const PointMatch> points;  // optional
-  uint64_t user_tag = 0;               // these two come back in the result
+  /// Optional; in pixels of the image. Those that the lens cannot have imaged are left out.
+  std::span<const PointMatch> points;
+  uint64_t user_tag = 0;  // these two come back in the result
   uint32_t user_kind = 0;
   /// When set, the image is not copied: its planes must stay until the session has called this,
   /// once, from any thread and without a lock held; also when the frame is dropped or the session

@@ -8,117 +8,83 @@
 #include <utility>
 
 #include "plumb/geometry/line_projection.h"
+#include "plumb/map/box_pyramid.h"
 #include "plumb/map/box_tree.h"
+#include "plumb/map/line_blocks.h"
 
 namespace plumb {
 namespace {
 
-/// Where a camera with an enlarged image can see: planes with normal . x + offset >= 0 inside.
-/// Rounding is taken care of by `slack`, so that nothing that ProjectSegment() shows is lost.
-class Frustum {
- public:
-  Frustum(const Camera& camera, const Rigid3& cam_from_world, double margin_px) {
-    const double right = camera.width_px - 1 + margin_px, bottom = camera.height_px - 1 + margin_px;
-    // fx x / z + cx >= -margin for z > 0, and so on.
-    const std::array<Eigen::Vector3d, 5> normals_in_cam = {
-        Eigen::Vector3d(camera.fx, 0.0, camera.cx + margin_px),
-        Eigen::Vector3d(-camera.fx, 0.0, right - camera.cx),
-        Eigen::Vector3d(0.0, camera.fy, camera.cy + margin_px),
-        Eigen::Vector3d(0.0, -camera.fy, bottom - camera.cy),
-        Eigen::Vector3d(0.0, 0.0, 1.0),
-    };
-    const Eigen::Matrix3d world_from_cam = cam_from_world.RotationMatrix().transpose();
-    for (size_t i = 0; i < normals_.size(); ++i) {
-      const Eigen::Vector3d normal = normals_in_cam[i].normalized();
-      normals_[i] = world_from_cam * normal;
-      offsets_[i] = normal.dot(cam_from_world.translation);
-    }
-    offsets_.back() -= kNearPlane;
-    slack_ = 1e-9 * (1.0 + cam_from_world.translation.norm());
+/// Where a camera with an enlarged image can see, and how far: planes with normal . x + offset >= 0
+/// inside.
+BoxQuery FrustumOf(const Camera& camera, const Rigid3& cam_from_world,
+                   const VisibilityOptions& options) {
+  const double margin = options.margin_px;
+  const double right = camera.width_px - 1 + margin, bottom = camera.height_px - 1 + margin;
+  // fx x / z + cx >= -margin for z > 0, and so on.
+  const std::array<Eigen::Vector3d, BoxQuery::kPlanes> normals_in_cam = {
+      Eigen::Vector3d(camera.fx, 0.0, camera.cx + margin),
+      Eigen::Vector3d(-camera.fx, 0.0, right - camera.cx),
+      Eigen::Vector3d(0.0, camera.fy, camera.cy + margin),
+      Eigen::Vector3d(0.0, -camera.fy, bottom - camera.cy),
+      Eigen::Vector3d(0.0, 0.0, 1.0),
+  };
+  const Eigen::Matrix3d world_from_cam = cam_from_world.RotationMatrix().transpose();
+  BoxQuery query;
+  for (size_t i = 0; i < BoxQuery::kPlanes; ++i) {
+    const Eigen::Vector3d normal = normals_in_cam[i].normalized();
+    query.normals[i] = world_from_cam * normal;
+    query.offsets[i] = normal.dot(cam_from_world.translation);
   }
+  query.offsets.back() -= kNearPlane;
+  query.center = cam_from_world.Center();
+  query.reach_factor = options.max_distance_ratio;
+  return query;
+}
 
-  /// Whether no plane has the whole segment outside.
-  bool MayContain(const Segment3& segment) const {
-    for (size_t i = 0; i < normals_.size(); ++i) {
-      const double a = normals_[i].dot(segment.start), b = normals_[i].dot(segment.end);
-      if (std::max(a, b) + offsets_[i] < -slack_) return false;
-    }
-    return true;
-  }
-
-  bool MayContain(const Box& box) const {
-    for (size_t i = 0; i < normals_.size(); ++i) {
-      if (box.Support(normals_[i]) + offsets_[i] < -slack_) return false;
-    }
-    return true;
-  }
-
- private:
-  std::array<Eigen::Vector3d, 5> normals_;
-  std::array<double, 5> offsets_ = {};
-  double slack_ = 0.0;
-};
-
-/// What decides whether a line is visible.
-struct Entry {
-  Segment3 segment;
-  uint32_t line = 0;
-  uint32_t num_observing = 0;
-  uint32_t sightings_begin = 0, sightings_end = 0;
-};
-
-/// Whether one camera sees a line, or may see something of a box of lines.
-class ViewTest {
+/// Whether some key frame saw a line from a like direction and distance.
+class SightingTest {
  public:
   /// @param key_frames  Whose sightings count, borrowed; none: all.
-  ViewTest(const Camera& camera, const Rigid3& cam_from_world, const VisibilityOptions& options,
-           std::span<const LineSighting> sightings, std::span<const uint32_t> key_frames)
-      : camera_(camera),
-        options_(options),
-        sightings_(sightings),
-        key_frames_(key_frames),
-        frustum_(camera, cam_from_world, options.margin_px),
-        rotation_(cam_from_world.RotationMatrix()),
-        translation_(cam_from_world.translation),
-        center_(cam_from_world.Center()),
+  SightingTest(const VisibilityOptions& options, std::span<const uint32_t> key_frames)
+      : ratio_(options.max_distance_ratio),
         min_cosine_(options.max_view_angle_rad < std::numbers::pi
                         ? std::cos(options.max_view_angle_rad)
-                        : -2.0) {}
+                        : -2.0),
+        key_frames_(key_frames) {}
 
-  /// @param reach_m  Longest sighting of the lines in the box.
-  bool MayShow(const Box& box, double reach_m) const {
-    return box.DistanceTo(center_) <= options_.max_distance_ratio * reach_m &&
-           frustum_.MayContain(box);
-  }
+  enum class Answer { kNo, kYes, kUnsure };
 
-  /// Length of the visible part [px], or a negative number.
-  double Shows(const Entry& entry) const {
-    const Segment3& segment = entry.segment;
-    if (entry.num_observing < options_.min_observing || !frustum_.MayContain(segment) ||
-        !IsSeenAlike(entry)) {
-      return -1.0;
+  /// @param ray  From the line's middle to the camera.
+  Answer Ask(const Eigen::Vector3f& ray, std::span<const LineSighting> sightings) const {
+    constexpr float kSlack = 1e-5f;
+    const float distance = ray.norm();
+    const auto ratio = static_cast<float>(ratio_), min_cosine = static_cast<float>(min_cosine_);
+    const float sure = 1.0f + kSlack, perhaps = 1.0f - kSlack;
+    Answer answer = Answer::kNo;
+    for (const LineSighting& sighting : sightings) {
+      const float seen_from = sighting.distance_m;
+      const float along = sighting.direction_to_camera.dot(ray);
+      const float farthest = ratio * seen_from, nearest = ratio * distance;
+      if (!(distance * perhaps < farthest && seen_from * perhaps < nearest &&
+            along > (min_cosine - kSlack) * distance) ||
+          !Counts(sighting.key_frame)) {
+        continue;
+      }
+      if (distance * sure < farthest && seen_from * sure < nearest &&
+          along > (min_cosine + kSlack) * distance) {
+        return Answer::kYes;
+      }
+      answer = Answer::kUnsure;
     }
-    const auto visible = ProjectSegmentInCam(
-        camera_, {rotation_ * segment.start + translation_, rotation_ * segment.end + translation_},
-        options_.margin_px);
-    const double length = visible ? visible->Length() : -1.0;
-    return length >= options_.min_length_px ? length : -1.0;
+    return answer;
   }
 
- private:
-  bool Counts(uint32_t key_frame) const {
-    return key_frames_.empty() ||
-           std::find(key_frames_.begin(), key_frames_.end(), key_frame) != key_frames_.end();
-  }
-
-  /// Some key frame saw the line from a like direction and distance.
-  bool IsSeenAlike(const Entry& entry) const {
-    const Eigen::Vector3d ray = center_ - entry.segment.Midpoint();
-    const double distance = ray.norm(), ratio = options_.max_distance_ratio;
-    for (uint32_t i = entry.sightings_begin; i < entry.sightings_end; ++i) {
-      const LineSighting& sighting = sightings_[i];
+  bool AskExactly(const Eigen::Vector3d& ray, std::span<const LineSighting> sightings) const {
+    const double distance = ray.norm();
+    for (const LineSighting& sighting : sightings) {
       const double seen_from = static_cast<double>(sighting.distance_m);
-      if (distance < ratio * seen_from && seen_from < ratio * distance &&
+      if (distance < ratio_ * seen_from && seen_from < ratio_ * distance &&
           sighting.direction_to_camera.cast<double>().dot(ray) > min_cosine_ * distance &&
           Counts(sighting.key_frame)) {
         return true;
@@ -127,14 +93,14 @@ class ViewTest {
     return false;
   }
 
-  const Camera& camera_;
-  const VisibilityOptions& options_;
-  std::span<const LineSighting> sightings_;
+ private:
+  bool Counts(uint32_t key_frame) const {
+    return key_frames_.empty() ||
+           std::find(key_frames_.begin(), key_frames_.end(), key_frame) != key_frames_.end();
+  }
+
+  double ratio_, min_cosine_;
   std::span<const uint32_t> key_frames_;
-  Frustum frustum_;
-  Eigen::Matrix3d rotation_;
-  Eigen::Vector3d translation_, center_;
-  double min_cosine_;
 };
 
 std::vector<Box> BoxesOf(const std::vector<MapLine>& lines) {
@@ -166,31 +132,31 @@ using RankedKeyFrame = std::pair<double, uint32_t>;
 
 }  // namespace
 
+/// The longest view of each line bounds how far away it can count as visible.
+std::vector<float> ReachOf(const LineMap& map) {
+  std::vector<float> reach_m(map.lines.size(), 0.0f);
+  for (uint32_t i = 0; i < reach_m.size(); ++i) {
+    for (const LineSighting& sighting : map.SightingsOf(i)) {
+      reach_m[i] = std::max(reach_m[i], sighting.distance_m);
+    }
+  }
+  return reach_m;
+}
+
 struct MapIndex::Impl {
   explicit Impl(const LineMap& borrowed)
-      : map(borrowed), lines(BoxesOf(borrowed.lines)), key_frames(CentersOf(borrowed.key_frames)) {
-    // The longest view of each node's lines bounds how far away they can count as visible.
-    reach_m.resize(lines.nodes().size());
-    for (size_t i = 0; i < reach_m.size(); ++i) {
-      const BoxTree::Node& node = lines.nodes()[i];
-      for (uint32_t k = node.begin; k < node.end; ++k) {
-        for (const LineSighting& sighting : map.SightingsOf(lines.order()[k])) {
-          reach_m[i] = std::max(reach_m[i], static_cast<double>(sighting.distance_m));
-        }
-      }
-    }
-    entries.reserve(map.lines.size());
+      : map(borrowed),
+        pyramid(BoxesOf(borrowed.lines), ReachOf(borrowed)),
+        blocks(borrowed, pyramid.order()),
+        key_frames(CentersOf(borrowed.key_frames)) {
+    sighting_begin.reserve(map.lines.size() + 1);
     sightings.reserve(map.sightings.size());
-    for (const uint32_t line : lines.order()) {
-      Entry& entry = entries.emplace_back();
-      entry.segment = map.lines[line].segment_in_world;
-      entry.line = line;
-      entry.num_observing = map.lines[line].num_observing;
-      entry.sightings_begin = static_cast<uint32_t>(sightings.size());
+    for (const uint32_t line : pyramid.order()) {
+      sighting_begin.push_back(static_cast<uint32_t>(sightings.size()));
       const auto seen = map.SightingsOf(line);
       sightings.insert(sightings.end(), seen.begin(), seen.end());
-      entry.sightings_end = static_cast<uint32_t>(sightings.size());
     }
+    sighting_begin.push_back(static_cast<uint32_t>(sightings.size()));
     for (const KeyFrame& key_frame : map.key_frames) {
       axes.push_back(OpticalAxis(key_frame.cam_from_world));
       centers.push_back(key_frame.cam_from_world.Center());
@@ -233,22 +199,41 @@ struct MapIndex::Impl {
       nearest.push_back(k);
     }
     if (options.nearest_key_frames > 0 && nearest.empty()) return;
-    const ViewTest view(camera, cam_from_world, options, sightings, nearest);
-    lines.ForEachRange(
-        [&](uint32_t node) { return view.MayShow(lines.nodes()[node].box, reach_m[node]); },
-        [&](uint32_t begin, uint32_t end) {
-          for (uint32_t i = begin; i < end; ++i) {
-            const double length = view.Shows(entries[i]);
-            if (length >= 0.0) visit(entries[i].line, length);
-          }
-        });
+    thread_local std::vector<uint32_t> leaves;
+    thread_local std::vector<BlockLine> found;
+    pyramid.Find(FrustumOf(camera, cam_from_world, options), &leaves);
+    blocks.Project(camera, cam_from_world, options.margin_px, options.min_length_px,
+                   options.min_observing, leaves, &found);
+    const SightingTest test(options, nearest);
+    const Eigen::Vector3d center = cam_from_world.Center();
+    for (const BlockLine& candidate : found) {
+      const uint32_t row = candidate.row;
+      const auto seen = std::span(sightings).subspan(sighting_begin[row],
+                                                     sighting_begin[row + 1] - sighting_begin[row]);
+      const uint32_t line = pyramid.order()[row];
+      const Segment3& segment = map.lines[line].segment_in_world;
+      SightingTest::Answer answer = test.Ask(-blocks.MidpointFrom(center, row), seen);
+      if (answer == SightingTest::Answer::kUnsure) {
+        answer = test.AskExactly(center - segment.Midpoint(), seen) ? SightingTest::Answer::kYes
+                                                                    : SightingTest::Answer::kNo;
+      }
+      if (answer == SightingTest::Answer::kNo) continue;
+      double length = static_cast<double>(candidate.length_px);
+      if (length < 0.0) {
+        const auto visible = ProjectSegment(camera, cam_from_world, segment, options.margin_px);
+        length = visible ? visible->Length() : -1.0;
+        if (!(length >= options.min_length_px)) continue;
+      }
+      visit(line, length);
+    }
   }
 
   const LineMap& map;
-  BoxTree lines, key_frames;
-  std::vector<Entry> entries;           // in the order of `lines`
-  std::vector<LineSighting> sightings;  // of the entries
-  std::vector<double> reach_m;          // a node of `lines`
+  BoxPyramid pyramid;
+  LineBlocks blocks;  // their rows are pyramid.order()
+  BoxTree key_frames;
+  std::vector<uint32_t> sighting_begin;  // of every row, and the end
+  std::vector<LineSighting> sightings;   // of the rows
   std::vector<Eigen::Vector3d> axes, centers;
 };
 

@@ -32,6 +32,7 @@ struct City {
       return std::uniform_real_distribution<double>(low, high)(rng);
     };
     const uint32_t num_rooms = std::max(1u, num_lines / kLinesInARoom);
+    const uint32_t lines_in_a_room = std::min(num_lines, kLinesInARoom);
     const auto side = static_cast<uint32_t>(std::ceil(std::sqrt(num_rooms)));
     for (uint32_t room = 0; room < num_rooms; ++room) {
       const Eigen::Vector3d corner(6.0 * (room % side), 0.0, 6.0 * (room / side));
@@ -46,7 +47,7 @@ struct City {
         key_frame.cam_from_world = {rotation, -(rotation * inside(1.0))};
         map.key_frames.push_back(key_frame);
       }
-      for (uint32_t i = 0; i < kLinesInARoom; ++i) {
+      for (uint32_t i = 0; i < lines_in_a_room; ++i) {
         MapLine line;
         const Eigen::Vector3d midpoint = inside(0.3);
         const Eigen::Vector3d half(uniform(-0.3, 0.3), uniform(-0.3, 0.3), uniform(-0.3, 0.3));
@@ -195,7 +196,8 @@ void BM_NearestKeyFrames(benchmark::State& state) {
   }
 }
 
-#define PLUMB_SIZES ->Arg(2000)->Arg(10000)->Arg(100000)->Arg(1000000)->Unit(benchmark::kMicrosecond)
+#define PLUMB_SIZES \
+  ->Arg(1000)->Arg(10000)->Arg(100000)->Arg(1000000)->Arg(10000000)->Unit(benchmark::kMicrosecond)
 BENCHMARK(BM_MapIndex) PLUMB_SIZES;
 BENCHMARK(BM_BoostRtree) PLUMB_SIZES;
 BENCHMARK(BM_AllLines) PLUMB_SIZES;

@@ -35,6 +35,10 @@ constexpr double kReusePositionM = 0.05, kReuseRotationRad = 0.035;
 // Shares of the time budget after which no further start, attempt or last step begins.
 constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.9;
 
+// A pose needs this share of the evidence that the key frames beside it have for theirs; it is not
+// asked for when there is so much that no key frame asks for more.
+constexpr double kShareOfKeyFrames = 0.15, kPlentyOfNats = 60.0;
+
 // Points that take part in the joint solution lie this near to the lines' pose.
 constexpr size_t kMinPoints = 6;
 // A pose from points alone is a start for the lines, and with many points an answer.
@@ -69,7 +73,7 @@ Matrix6d PriorInformation(const PosePrior& prior) {
 }  // namespace
 
 SearchMethod::SearchMethod(const MapIndex& index, const PoseRefinerOptions& options)
-    : index_(index), options_(options), selector_(index) {}
+    : index_(index), options_(options), selector_(index), expected_evidence_(index) {}
 
 void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   Stopwatch whole, watch;
@@ -235,8 +239,10 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
       .evidence_nats = MeasureEvidence(input.camera, best.alignment.cam_from_world).nats,
       .num_observed_directions = CountObservedDirections(
           best.alignment.line_information / std::max(best.alignment.residual_scale, 1.0), prior)};
+  const double needed_nats =
+      EvidenceNeeded(best.alignment.cam_from_world, attempt.evidence.evidence_nats, num_tried);
   attempt.status = Decide(attempt.evidence, {.min_map_support = options_.min_map_support,
-                                             .min_evidence_nats = EvidenceToBeat(num_tried),
+                                             .min_evidence_nats = needed_nats,
                                              .min_gain = input.search ? kSearchGain : kStreamGain,
                                              .needs_all_directions = input.search});
   stages_.support_ns += watch.Lap();
@@ -290,6 +296,12 @@ PoseSupport SearchMethod::MeasureSupport(const Camera& camera, const Rigid3& cam
 MatchEvidence SearchMethod::MeasureEvidence(const Camera& camera, const Rigid3& cam_from_world) {
   ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
   return evidence_meter_.Measure(projected_, segments_.table);
+}
+
+double SearchMethod::EvidenceNeeded(const Rigid3& cam_from_world, double nats, uint32_t num_tried) {
+  const double by_chance = EvidenceToBeat(num_tried);
+  if (nats < by_chance || nats > kPlentyOfNats) return by_chance;
+  return std::max(by_chance, kShareOfKeyFrames * expected_evidence_.LeastNear(cam_from_world));
 }
 
 void SearchMethod::FinishOnLocalLines(const RefineInput& input, const PosePriorFactor& prior,

@@ -14,6 +14,7 @@
 #include "plumb/matching/soft_association.h"
 #include "plumb/matching/support.h"
 #include "plumb/runtime/acceptance_gate.h"
+#include "plumb/runtime/expected_evidence.h"
 #include "plumb/runtime/fine_alignment.h"
 #include "plumb/runtime/line_selection.h"
 #include "plumb/runtime/point_solver.h"
@@ -61,6 +62,8 @@ class SearchMethod {
   bool IsOutOfTime(double share = 1.0);
   PoseSupport MeasureSupport(const Camera& camera, const Rigid3& cam_from_world);
   MatchEvidence MeasureEvidence(const Camera& camera, const Rigid3& cam_from_world);
+  /// What a pose needs to be accepted, from chance and from the map's own key frames.
+  double EvidenceNeeded(const Rigid3& cam_from_world, double nats, uint32_t num_tried);
   /// The last steps of a pose that was accepted, and its covariance.
   void Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
               RefineResult* result);
@@ -84,6 +87,7 @@ class SearchMethod {
   FineAligner aligner_;
   SupportMeter support_meter_;
   EvidenceMeter evidence_meter_;
+  ExpectedEvidence expected_evidence_;
   ProjectedLines projected_;
   std::vector<Survivor> survivors_;
   PointSolver point_solver_;

@@ -23,6 +23,7 @@ struct BenchRefineOptions {
   std::string segments;
   CityQueryOptions city;
   uint32_t hypotheses = 1500;
+  uint64_t seed = 0;
   size_t limit = 1000, warm_up = 10;
   int repeat = 1;
   double budget_ms = 0.0;
@@ -63,6 +64,7 @@ Outcome Measure(const BenchRefineOptions& options, const MapIndex& index,
       index,
       {.method = options.run.method == "paper" ? RefineMethod::kPaper : RefineMethod::kSearch,
        .num_hypotheses = options.hypotheses,
+       .seed = options.seed,
        .time_budget_ns = static_cast<int64_t>(1e6 * options.budget_ms)});
   if (!refiner) return FailureFrom(refiner.error());
   StreamTracker tracker(refiner->get());
@@ -233,6 +235,8 @@ void AddBenchRefine(CLI::App& bench, PendingRun& pending) {
             ->capture_default_str();
         command.add_option("--hypotheses", options.hypotheses, "Of the search")
             ->check(CLI::Range(1u, 2048u))
+            ->capture_default_str();
+        command.add_option("--seed", options.seed, "Of the search; another one, other hypotheses")
             ->capture_default_str();
         command.add_option("--limit", options.limit, "Use at most so many frames")
             ->check(CLI::Range(size_t{1}, size_t{100'000}))

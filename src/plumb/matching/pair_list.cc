@@ -116,10 +116,15 @@ void PairList::Build(const ProjectedLines& lines, const SegmentTable& segments,
       limits.sine < 1.0f ? std::asin(limits.sine) + kAngleSlack : std::numbers::pi_v<float>;
   num_lines_ = lines.size();
   num_segments_ = segments.size();
-  line_.clear();
-  segment_.clear();
   if (inside_.size() < segments.size() + kLanes) inside_.resize(segments.size() + kLanes);
-  for (size_t i = 0; i < lines.size() && line_.size() < kMaxPairs; ++i) {
+  // Every row is written and the next one takes its place unless it is inside: the outcome is too
+  // irregular for a branch.
+  if (line_.size() < kMaxPairs + segments.size() + kLanes) {
+    line_.resize(kMaxPairs + segments.size() + kLanes);
+    segment_.resize(line_.size());
+  }
+  size_t listed = 0;
+  for (size_t i = 0; i < lines.size() && listed < kMaxPairs; ++i) {
     if (!(lines.length[i] > 0.0f)) continue;
     const ImageLine line{lines.x[i], lines.y[i], lines.direction_x[i], lines.direction_y[i],
                          lines.length[i]};
@@ -130,19 +135,19 @@ void PairList::Build(const ProjectedLines& lines, const SegmentTable& segments,
                    segments.x1.data() + b, segments.y1.data() + b, segments.direction_x.data() + b,
                    segments.direction_y.data() + b, segments.length.data() + b, inside_.data());
       for (size_t k = 0; k < count; ++k) {
-        if (inside_[k] == 0) continue;
-        line_.push_back(static_cast<int32_t>(i));
-        segment_.push_back(static_cast<int32_t>(b + k));
+        line_[listed] = static_cast<int32_t>(i);
+        segment_[listed] = static_cast<int32_t>(b + k);
+        listed += static_cast<size_t>(inside_[k]);
       }
     }
   }
-  num_listed_ = std::min(line_.size(), kMaxPairs);
-  line_.resize(num_listed_);
-  segment_.resize(num_listed_);
+  num_listed_ = std::min(listed, kMaxPairs);
   const size_t padded = Padded(num_listed_);
-  line_.resize(padded, 0);
-  // The row after the last is padding that overlaps nothing.
-  segment_.resize(padded, static_cast<int32_t>(segments.size()));
+  for (size_t k = num_listed_; k < padded; ++k) {
+    line_[k] = 0;
+    // The row after the last is padding that overlaps nothing.
+    segment_[k] = static_cast<int32_t>(segments.size());
+  }
   const auto gather = [&](const std::vector<float>& in, std::vector<float>* out) {
     out->resize(padded);
     GatherKernel(padded, segment_.data(), in.data(), out->data());
@@ -157,28 +162,34 @@ void PairList::Build(const ProjectedLines& lines, const SegmentTable& segments,
   for (std::vector<float>* column : {&e_, &overlap_, &begin_, &end_, &square_}) {
     column->resize(padded);
   }
-  kept_.resize(padded);
+  kept_.resize(padded + 1);
+  goes_on_.resize(padded);
+  for (size_t k = 0; k < num_listed_; ++k) {
+    goes_on_[k] = static_cast<float>(k > 0 && line_[k] == line_[k - 1]);
+  }
   line_sum_.resize(num_lines_);
   segment_sum_.resize(num_segments_);
 }
 
 void PairList::Weigh(const ProjectedLines& lines, const AssociationGates& gates) {
-  const size_t padded = line_.size();
+  const size_t padded = x0_.size();
   WeighKernel(LimitsOf(gates, 0.0f), static_cast<float>(-0.5 / (gates.sigma_px * gates.sigma_px)),
               static_cast<float>(-0.5 / (gates.sigma_sine * gates.sigma_sine)), padded,
               line_.data(), lines.x.data(), lines.y.data(), lines.direction_x.data(),
               lines.direction_y.data(), lines.length.data(), x0_.data(), y0_.data(), x1_.data(),
               y1_.data(), direction_x_.data(), direction_y_.data(), length_.data(), e_.data(),
               overlap_.data(), begin_.data(), end_.data(), square_.data());
-  std::fill(line_sum_.begin(), line_sum_.end(), kOutlierMass);
   std::fill(segment_sum_.begin(), segment_sum_.end(), kOutlierMass);
+  // Pairs outside the gates have e = 0, so that all are summed without a branch. Those of a line are
+  // neighbours: their sum is carried in a register, not waited for in memory.
   size_t kept = 0;
+  float sum = 0.0f;
   for (size_t k = 0; k < num_listed_; ++k) {
-    kept_[kept] = static_cast<int32_t>(k);
-    if (!(e_[k] > 0.0f)) continue;
-    ++kept;
-    line_sum_[static_cast<size_t>(line_[k])] += e_[k];
+    sum = sum * goes_on_[k] + ((1.0f - goes_on_[k]) * kOutlierMass + e_[k]);
+    line_sum_[static_cast<size_t>(line_[k])] = sum;
     segment_sum_[static_cast<size_t>(segment_[k])] += e_[k];
+    kept_[kept] = static_cast<int32_t>(k);
+    kept += static_cast<size_t>(e_[k] > 0.0f);
   }
   pairs_.Resize(kept);
   for (size_t p = 0; p < kept; ++p) {

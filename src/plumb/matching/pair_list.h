@@ -45,9 +45,11 @@ class PairList {
   const Pairs& pairs() const { return pairs_; }
 
  private:
-  // The list, padded to a multiple of SegmentTable::kLanes: rows, and a copy of the segments.
+  // The list, padded to a multiple of SegmentTable::kLanes: rows, with room for more than are
+  // listed, and a copy of the segments.
   size_t num_listed_ = 0, num_lines_ = 0, num_segments_ = 0;
   std::vector<int32_t> line_, segment_;
+  std::vector<float> goes_on_;  // 1 where the pair before has the same line, otherwise 0
   std::vector<float> x0_, y0_, x1_, y1_, direction_x_, direction_y_, length_;
   // At the pose of Weigh().
   std::vector<float> e_, overlap_, begin_, end_, square_;

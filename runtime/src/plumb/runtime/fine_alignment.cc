@@ -21,7 +21,9 @@ constexpr float kOverlapCapPx = 120.0f, kOverlapUnitPx = 30.0f;
 // How far the image may move before pairs are listed anew, and the depth at which a translation
 // moves it so far.
 constexpr double kSlackPx = 3.0, kUsualDepthM = 1.0;
-constexpr double kConvergedStep = 1e-7;
+// A step that moves the image so little ends those with the same gates; so short a step the last
+// ones.
+constexpr double kConvergedPx = 0.01, kConvergedStep = 1e-6;
 constexpr size_t kMinPairs = 4;
 constexpr double kMaxRotationStep = 0.1;
 constexpr double kMinResidualScale = 0.02;
@@ -98,7 +100,9 @@ FineAlignment FineAligner::Run(const Rigid3& start, std::span<const AlignmentSte
                                const PosePriorFactor& prior, const PointTable* points) {
   FineAlignment out;
   out.cam_from_world = start;
+  const AlignmentStep* converged = nullptr;
   for (const AlignmentStep& step : schedule) {
+    if (converged != nullptr && *converged == step) continue;
     ProjectTable(camera_, out.cam_from_world, lines_, kMinVisiblePx, &projected_);
     ListPairs(step);
     list_.Weigh(projected_, {.sigma_px = step.sigma_px, .sigma_sine = step.sigma_sine});
@@ -124,8 +128,10 @@ FineAlignment FineAligner::Run(const Rigid3& start, std::span<const AlignmentSte
     const auto delta = SolveStep(equations, kMaxRotationStep);
     if (!delta) break;
     out.cam_from_world = Perturb(out.cam_from_world, *delta);
-    moved_px_ +=
+    const double moved_px =
         camera_.MeanFocal() * (delta->head<3>().norm() + delta->tail<3>().norm() / kUsualDepthM);
+    moved_px_ += moved_px;
+    if (moved_px < kConvergedPx) converged = &step;
   }
   return out;
 }

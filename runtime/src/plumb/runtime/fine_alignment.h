@@ -23,6 +23,8 @@ struct AlignmentStep {
   double sigma_px;    // of the distance between line and segment
   double sigma_sine;  // of the sine of their angle
   double robust;      // scale of the Geman-McClure weight, in deviations
+
+  bool operator==(const AlignmentStep&) const = default;
 };
 
 // The schedules of docs/method/association.md.
@@ -60,7 +62,8 @@ class FineAligner {
   void Begin(const Camera& camera, const Rigid3& reference, std::span<const CandidateLine> lines,
              const FrameSegments& segments);
 
-  /// Each step associates the lines with the segments and solves once, with `prior` as a factor.
+  /// Each step associates the lines with the segments and solves once, with `prior` as a factor;
+  /// one that moves the image by less than 0.01 px is the last of its equals.
   /// Observations are weighted with pair weight x line weight x overlap (at most 120 px) / 30 px;
   /// their variance is max(0.7, sigma / 2)^2 px^2 plus the line's own. With `points`, the lines'
   /// information is divided by their residual scale, so that each family counts by its own
@@ -70,7 +73,7 @@ class FineAligner {
                     const PosePriorFactor& prior, const PointTable* points = nullptr);
 
   /// Gauss-Newton on the last associations of a run with points, one Geman-McClure weight an
-  /// observation and the scales as they are, at most `max_steps`, until the step is below 1e-7.
+  /// observation and the scales as they are, at most `max_steps`, until the step is below 1e-6.
   /// @return the pose.
   Rigid3 Polish(const FineAlignment& alignment, double robust, int max_steps,
                 const PosePriorFactor& prior, const PointTable& points);

@@ -78,16 +78,20 @@ void SampleLines(const Camera& camera, const Rigid3& cam_from_world,
 void TakeEvery(const LineSamples& samples, size_t stride, LineSamples* out) {
   out->lines.clear();
   double total = 0.0;
-  size_t k = 0, next = stride / 2;
+  size_t next = stride / 2;  // counted from the line's first sample
   for (const SampledLine& line : samples.lines) {
-    for (uint32_t i = 0; i < line.num_samples; ++i, ++k) {
-      if (k != next) continue;
-      next += stride;
-      const Eigen::Vector3f point = line.first + static_cast<float>(i) * line.step;
-      out->lines.push_back(
-          {.first = point, .step = line.step, .weight = line.weight, .num_samples = 1});
-      total += static_cast<double>(line.weight);
+    if (next >= line.num_samples) {
+      next -= line.num_samples;
+      continue;
     }
+    // Samples of one line stay together, so that they go on sharing its motion and direction.
+    const size_t count = (line.num_samples - next + stride - 1) / stride;
+    out->lines.push_back({.first = line.first + static_cast<float>(next) * line.step,
+                          .step = static_cast<float>(stride) * line.step,
+                          .weight = line.weight,
+                          .num_samples = static_cast<uint32_t>(count)});
+    total += static_cast<double>(line.weight) * static_cast<double>(count);
+    next += count * stride - line.num_samples;
   }
   Finish(total, out);
 }

@@ -175,7 +175,8 @@ void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
       hypotheses_.resize(num_second);
     }
   }
-  Rank(kScoringSigmaPx, samples_);
+  TakeEvery(samples_, 2, &half_samples_);
+  Rank(kScoringSigmaPx, half_samples_);
 }
 
 void PoseSearch::Rank(double sigma_px, const LineSamples& samples) {
@@ -187,8 +188,8 @@ void PoseSearch::Rank(double sigma_px, const LineSamples& samples) {
 void PoseSearch::Sort() { std::sort(hypotheses_.begin(), hypotheses_.end(), kIsBetter); }
 
 void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& options) {
-  TakeEvery(samples_, 2, &half_samples_);
   late_ = hypotheses_;
+  is_ranked_ = false;
   hypotheses_.resize(std::min(hypotheses_.size(), kNumFirst));
   for (size_t i = 0; i < std::size(kLevels); ++i) {
     // The late ones enter in any case: better a few levels of all than all of a few.
@@ -204,8 +205,10 @@ void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& opti
     for (Hypothesis& h : hypotheses_) {
       h.pose = aligner_.Align(camera_, field_, samples, h.pose, alignment);
     }
+    is_ranked_ = false;
     if (hypotheses_.size() <= kMinAligned) continue;
     Rank(level.sigma_px, samples);
+    is_ranked_ = i + 1 == std::size(kLevels);
     DropDuplicates();
     if (hypotheses_.size() > level.num_kept) hypotheses_.resize(level.num_kept);
   }
@@ -228,7 +231,7 @@ void PoseSearch::DropDuplicates() {
 }
 
 void PoseSearch::CollectSurvivors(const SearchRegion& region, size_t max_survivors) {
-  Rank(kFinalSigmaPx, samples_);
+  if (!is_ranked_) Rank(kFinalSigmaPx, samples_);
   for (const Hypothesis& h : hypotheses_) {
     if (found_.size() == max_survivors) return;
     const Rigid3 pose = h.pose.After(region.cam_from_world);

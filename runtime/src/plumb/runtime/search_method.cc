@@ -39,6 +39,10 @@ constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.
 // asked for when there is so much that no key frame asks for more.
 constexpr double kShareOfKeyFrames = 0.15, kPlentyOfNats = 60.0;
 
+// Starts with a smaller share of the best one's score are not aligned. Beside points that decide,
+// whose pose is a start too, the best is enough to contradict them.
+constexpr double kNearBest = 0.8, kBesidePoints = 1.0;
+
 // Points that take part in the joint solution lie this near to the lines' pose.
 constexpr size_t kMinPoints = 6;
 // A pose from points alone is a start for the lines, and with many points an answer.
@@ -213,7 +217,9 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
     survivor.support = MeasureSupport(input.camera, survivor.alignment.cam_from_world);
     stages_.support_ns += watch.Lap();
   };
+  const double least = HoldsByPoints(input) ? kBesidePoints : kNearBest;
   for (const FoundPose& start : starts) {
+    if (start.score < least * starts[0].score) break;
     if (!survivors_.empty() && IsOutOfTime(kStartsShare)) break;
     align_from(start.cam_from_world);
   }

@@ -180,8 +180,8 @@ void PairList::Weigh(const ProjectedLines& lines, const AssociationGates& gates)
               y1_.data(), direction_x_.data(), direction_y_.data(), length_.data(), e_.data(),
               overlap_.data(), begin_.data(), end_.data(), square_.data());
   std::fill(segment_sum_.begin(), segment_sum_.end(), kOutlierMass);
-  // Pairs outside the gates have e = 0, so that all are summed without a branch. Those of a line are
-  // neighbours: their sum is carried in a register, not waited for in memory.
+  // Pairs outside the gates have e = 0, so that all are summed without a branch. Those of a line
+  // are neighbours: their sum is carried in a register, not waited for in memory.
   size_t kept = 0;
   float sum = 0.0f;
   for (size_t k = 0; k < num_listed_; ++k) {

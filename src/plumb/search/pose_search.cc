@@ -29,8 +29,8 @@ struct Level {
   size_t num_kept;
   bool all_samples;
 };
-constexpr Level kLevels[] = {{30.0, 3, 12, false}, {20.0, 3, 8, false}, {12.0, 2, 20, false},
-                             {12.0, 2, 12, false}, {6.0, 3, 10, true},  {3.0, 2, 8, true}};
+constexpr Level kLevels[] = {{30.0, 3, 12, false}, {20.0, 3, 8, false}, {12.0, 2, 28, false},
+                             {12.0, 2, 18, false}, {6.0, 3, 10, true},  {3.0, 2, 8, true}};
 constexpr size_t kNumFirst = 20;   // hypotheses at the first level
 constexpr size_t kLateLevel = 2;   // where all enter, past the widest sigmas
 constexpr size_t kMinAligned = 8;  // so few are not ranked
@@ -175,8 +175,7 @@ void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
       hypotheses_.resize(num_second);
     }
   }
-  TakeEvery(samples_, 2, &half_samples_);
-  Rank(kScoringSigmaPx, half_samples_);
+  Rank(kScoringSigmaPx, samples_);
 }
 
 void PoseSearch::Rank(double sigma_px, const LineSamples& samples) {
@@ -188,6 +187,7 @@ void PoseSearch::Rank(double sigma_px, const LineSamples& samples) {
 void PoseSearch::Sort() { std::sort(hypotheses_.begin(), hypotheses_.end(), kIsBetter); }
 
 void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& options) {
+  TakeEvery(samples_, 2, &half_samples_);
   late_ = hypotheses_;
   is_ranked_ = false;
   hypotheses_.resize(std::min(hypotheses_.size(), kNumFirst));

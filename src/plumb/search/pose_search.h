@@ -50,7 +50,7 @@ struct FoundPose {
 };
 
 /// Hypotheses from the prior (half of them with the rotation found first), scored on a direction
-/// field of quarter resolution: all of them by an eighth of the samples, the better ones by half.
+/// field of quarter resolution: all of them by an eighth of the samples, the better ones by all.
 /// The best are aligned on the same field while sigma shrinks from 30 to 3 px, and once more from
 /// 12 px only: at 30 px most starts run into one optimum, which need not be the right one. At each
 /// level duplicates and the worse ones are dropped. Images wider than 960 px are searched as if

@@ -39,10 +39,6 @@ constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.
 // asked for when there is so much that no key frame asks for more.
 constexpr double kShareOfKeyFrames = 0.15, kPlentyOfNats = 60.0;
 
-// Starts with a smaller share of the best one's score are not aligned. Beside points that decide,
-// whose pose is a start too, the best is enough to contradict them.
-constexpr double kNearBest = 0.8, kBesidePoints = 1.0;
-
 // Points that take part in the joint solution lie this near to the lines' pose.
 constexpr size_t kMinPoints = 6;
 // A pose from points alone is a start for the lines, and with many points an answer.
@@ -217,9 +213,10 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
     survivor.support = MeasureSupport(input.camera, survivor.alignment.cam_from_world);
     stages_.support_ns += watch.Lap();
   };
-  const double least = HoldsByPoints(input) ? kBesidePoints : kNearBest;
-  for (const FoundPose& start : starts) {
-    if (start.score < least * starts[0].score) break;
+  // Points that decide are a start too; beside it the search's best is enough to contradict them.
+  const size_t num_starts =
+      HoldsByPoints(input) ? std::min<size_t>(1, starts.size()) : starts.size();
+  for (const FoundPose& start : starts.first(num_starts)) {
     if (!survivors_.empty() && IsOutOfTime(kStartsShare)) break;
     align_from(start.cam_from_world);
   }

@@ -268,6 +268,42 @@ TEST(MapBuilder, BuildsAgainAfterMoreFrames) {
   EXPECT_EQ(builder.stats().num_multi_view_lines, 6u);
 }
 
+TEST(MapBuilder, MovedPosesTakeAllThatTheirFramesHoldAlong) {
+  Recording recording = Record(Room(), Path(4), 0.2);
+  for (KeyFrameInput& frame : recording.frames) {
+    frame.points.resize(1);
+    frame.points[0].point_in_world = {0.1f, 0.2f, 3.0f};
+  }
+  MapBuilder builder;
+  for (const KeyFrameInput& frame : recording.frames) {
+    ASSERT_TRUE(builder.AddKeyFrame(frame).has_value());
+  }
+  const Result<LineMap> before = builder.Build();
+  ASSERT_TRUE(before.has_value());
+  const Rigid3 new_from_old{ExpSo3({0.1, 0.2, -0.3}), {1.0, -2.0, 0.5}};
+  std::vector<Rigid3> poses;
+  for (const KeyFrame& frame : before->key_frames) {
+    poses.push_back(frame.cam_from_world * new_from_old.Inverse());
+  }
+  ASSERT_TRUE(builder.SetPoses(poses).has_value());
+  const Result<LineMap> after = builder.Build();
+  ASSERT_TRUE(after.has_value());
+  ASSERT_EQ(after->lines.size(), before->lines.size());
+  for (size_t i = 0; i < after->lines.size(); ++i) {
+    const Segment3& old = before->lines[i].segment_in_world;
+    const Segment3& now = after->lines[i].segment_in_world;
+    EXPECT_LT((new_from_old * old.start - now.start).norm(), 1e-6);
+    EXPECT_LT((new_from_old * old.end - now.end).norm(), 1e-6);
+  }
+  const Eigen::Vector3d point = after->key_frames[2].points[0].point_in_world.cast<double>();
+  EXPECT_LT((new_from_old * Eigen::Vector3d(0.1, 0.2, 3.0) - point).norm(), 1e-5);
+
+  poses.pop_back();
+  EXPECT_FALSE(builder.SetPoses(poses).has_value());
+  poses.push_back({Eigen::Quaterniond(2.0, 0.0, 0.0, 0.0), {}});
+  EXPECT_FALSE(builder.SetPoses(poses).has_value());
+}
+
 TEST(MapBuilder, KeepsWhatTheCallerAttaches) {
   Recording recording = Record(Room(), Path(2), 0.0);
   recording.frames[1].points.resize(3);

@@ -41,6 +41,7 @@ void WriteUnchecked(const LineMap& map, const std::string& directory) {
   manifest.detector = map.detector;
   manifest.covariance_factor = map.covariance_factor;
   manifest.covariance_growth = map.covariance_growth;
+  manifest.pose_change = map.pose_change;
   manifest.origin = origin;
   std::filesystem::create_directories(directory + "/tiles");
   Spill(directory + "/manifest.json", WriteManifest(manifest));
@@ -76,6 +77,9 @@ TEST_F(MapFileTest, KeepsEverythingWithinFloatOfTheOrigin) {
   EXPECT_EQ(read->detector, map.detector);
   EXPECT_EQ(read->covariance_factor, map.covariance_factor);
   EXPECT_EQ(read->covariance_growth, map.covariance_growth);
+  ASSERT_TRUE(read->pose_change);
+  EXPECT_EQ(read->pose_change->position_m, map.pose_change->position_m);
+  EXPECT_EQ(read->pose_change->rotation_rad, map.pose_change->rotation_rad);
   EXPECT_EQ(read->sighting_begin, map.sighting_begin);
   ASSERT_EQ(read->lines.size(), map.lines.size());
   for (size_t i = 0; i < map.lines.size(); ++i) {
@@ -263,6 +267,9 @@ TEST_F(MapFileTest, RefusesHostileManifests) {
       {"a factor that is null", "\"covariance_factor\": 2.25", "\"covariance_factor\": null"},
       {"no factor", "covariance_factor", "covariance"},
       {"a negative growth", "\"covariance_growth\": 0.75", "\"covariance_growth\": -0.75"},
+      {"half a change of poses", "position_m", "position"},
+      {"a change of poses that is text", "\"rotation_rad\": 0.002", "\"rotation_rad\": \"2\""},
+      {"a negative change of poses", "\"position_m\": 0.004", "\"position_m\": -0.004"},
       {"a growth that is null", "\"covariance_growth\": 0.75", "\"covariance_growth\": null"},
       {"a detector that is a number", "\"lsd\"", "7"},
       {"a detector that is not UTF-8", "\"lsd\"", "\"\xff\xfe\""},

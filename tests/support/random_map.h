@@ -27,6 +27,7 @@ inline LineMap MakeRandomMap(const RandomMapSize& size, unsigned seed,
   map.detector = "lsd";
   map.covariance_factor = 2.25;
   map.covariance_growth = 0.75;
+  map.pose_change = PoseChange{0.004, 0.002};
   for (uint32_t k = 0; k < size.key_frames; ++k) {
     KeyFrame key_frame;
     key_frame.timestamp_ns = 1'000'000'000LL + 33'333'333LL * k;

@@ -140,6 +140,19 @@ inline std::vector<Rigid3> RoomKeyFrames() {
   return poses;
 }
 
+/// Views of one half of the room from places 2 m across; any two have most of their lines in
+/// common.
+inline std::vector<Rigid3> RoomSweep(int count) {
+  std::vector<Rigid3> poses;
+  for (int k = 0; k < count; ++k) {
+    const double s = 2.0 * std::numbers::pi * k / count, yaw = 0.6 * std::sin(3.0 * s);
+    poses.push_back(
+        LookAlong({-1.0 + 0.8 * std::cos(s), std::sin(s), 0.1 + 0.2 * std::cos(5.0 * s)},
+                  {std::cos(yaw), std::sin(yaw), -0.1 + 0.1 * std::sin(s)}));
+  }
+  return poses;
+}
+
 /// The map that perfect key frames would give: exact lines that claim `sigma_m` of uncertainty.
 inline LineMap MapOf(const std::vector<Segment3>& lines, const std::vector<Rigid3>& key_frames,
                      double sigma_m = 0.002) {

@@ -115,6 +115,27 @@ TEST_F(Replay, CalibrationOnTooFewKeyFramesSaysSo) {
   EXPECT_EQ(info["points"], 0);
 }
 
+TEST_F(Replay, AdjustedPosesAreReportedAndKept) {
+  const std::string build =
+      BuildArguments(room_->path()) + " --points none --adjust-poses --out " + (dir_ / "map");
+  const ProgramRun run = RunPlumbline(build + " --pose-sigma 0.2,0.05");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_GT(report["poses_adjusted_cm"].get<double>(), 0.0);
+  EXPECT_LT(report["poses_adjusted_cm"].get<double>(), 0.2);  // they were exact
+  EXPECT_LE(report["line_distance_after_px"].get<double>(),
+            report["line_distance_before_px"].get<double>());
+  const json info = json::parse(RunPlumbline("map info " + (dir_ / "map") + " --json").out);
+  EXPECT_EQ(info["poses_adjusted_cm"], report["poses_adjusted_cm"]);
+  EXPECT_EQ(info["poses_adjusted_deg"], report["poses_adjusted_deg"]);
+  const json plain = json::parse(RunPlumbline("map info " + Map() + " --json").out);
+  EXPECT_FALSE(plain.contains("poses_adjusted_cm"));
+
+  const ProgramRun wrong = RunPlumbline(build + " --pose-sigma 0,1");
+  EXPECT_EQ(wrong.exit_code, 64);
+  EXPECT_THAT(wrong.err, HasSubstr("--pose-sigma 0,1: want two positive numbers"));
+}
+
 TEST_F(Replay, PointsNeedAMapWithPoints) {
   const ProgramRun built =
       RunPlumbline(BuildArguments(room_->path()) + " --points none --out " + (dir_ / "map"));

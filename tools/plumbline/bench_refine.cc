@@ -184,7 +184,8 @@ Outcome RunBenchRefine(const BenchRefineOptions& options) {
   if (options.run.map.empty()) {
     LineMap map;
     CityQueryOptions city = options.city;
-    if (Outcome failed = ParsePriorSize(options.run.prior_size, &city.prior_cm, &city.prior_deg)) {
+    if (Outcome failed = ParsePoseSize("--prior-size", options.run.prior_size, &city.prior_cm,
+                                       &city.prior_deg)) {
       return failed;
     }
     city.num_frames = std::min(city.num_frames, options.limit) + options.warm_up;

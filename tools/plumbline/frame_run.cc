@@ -23,7 +23,7 @@ constexpr int64_t kWaitNs = 1'000'000'000;
 
 Outcome ReadPriors(const FrameRunOptions& options, FrameRun* run) {
   double cm = 0.0, deg = 0.0;
-  if (Outcome failed = ParsePriorSize(options.prior_size, &cm, &deg)) return failed;
+  if (Outcome failed = ParsePoseSize("--prior-size", options.prior_size, &cm, &deg)) return failed;
   PosePrior prior;
   prior.position_sigma_m = cm / 100.0;
   prior.rotation_sigma_rad = deg * std::numbers::pi / 180.0;
@@ -116,7 +116,8 @@ class ResultPump {
 
 }  // namespace
 
-Outcome ParsePriorSize(const std::string& text, double* out_cm, double* out_deg) {
+Outcome ParsePoseSize(const std::string& option, const std::string& text, double* out_cm,
+                      double* out_deg) {
   const std::vector<DataLine> lines = DataLines(text);
   if (lines.size() == 1 && lines[0].fields.size() == 2) {
     const Result<double> cm = ParseNumber(lines[0].fields[0]);
@@ -127,7 +128,7 @@ Outcome ParsePriorSize(const std::string& text, double* out_cm, double* out_deg)
       return std::nullopt;
     }
   }
-  return Failure{kExitUsage, "--prior-size " + text + ": want two positive numbers, CM,DEG"};
+  return Failure{kExitUsage, option + " " + text + ": want two positive numbers, CM,DEG"};
 }
 
 void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {

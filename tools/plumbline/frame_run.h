@@ -45,8 +45,9 @@ struct FrameRun {
   std::vector<cv::Mat> images;  // of the frames, decoded beforehand; empty: read on the way
 };
 
-/// "CM,DEG" into two positive numbers.
-Outcome ParsePriorSize(const std::string& text, double* out_cm, double* out_deg);
+/// "CM,DEG", the value of `option`, into two positive numbers.
+Outcome ParsePoseSize(const std::string& option, const std::string& text, double* out_cm,
+                      double* out_deg);
 
 /// Reads everything that `options` name. Every frame needs an image and a prior.
 Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run);

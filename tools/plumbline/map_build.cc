@@ -2,6 +2,8 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,10 +12,12 @@
 #include "plumb/map/map_builder.h"
 #include "plumb/map/map_file.h"
 #include "plumb/runtime/covariance_calibration.h"
+#include "plumb/runtime/pose_adjustment.h"
 #include "tools/datasets/image_file.h"
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/detector_choice.h"
+#include "tools/plumbline/frame_run.h"
 #include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 #include "tools/plumbline/output_directory.h"
@@ -28,6 +32,8 @@ struct MapBuildOptions {
   DetectorOptions detector;
   std::string points = "opencv";
   bool calibrate = true;
+  bool adjust_poses = false;
+  std::string pose_sigma = "0.5,0.1";  // cm, deg
   bool json = false;
 };
 
@@ -93,7 +99,33 @@ void Calibrate(LineMap* map) {
   map->covariance_growth = calibration.growth;
 }
 
-Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, double seconds) {
+Outcome ReadPoseSigma(const MapBuildOptions& options, BundleOptions* out_options) {
+  double cm = 0.0, deg = 0.0;
+  if (Outcome failed = ParsePoseSize("--pose-sigma", options.pose_sigma, &cm, &deg)) return failed;
+  out_options->position_sigma_m = 0.01 * cm;
+  out_options->rotation_sigma_rad = deg * std::numbers::pi / 180.0;
+  return std::nullopt;
+}
+
+/// Fuses the lines, with adjusted poses where they are asked for.
+Result<AdjustedMap> Fuse(const MapBuildOptions& options, const BundleOptions& bundle_options,
+                         MapBuilder* builder) {
+  ProgressBar bar("fuse lines", 100);
+  size_t percent = 0;
+  const auto progress = [&](double done) {
+    for (; static_cast<double>(percent) < 100.0 * done; ++percent) bar.Advance();
+  };
+  if (options.adjust_poses) return BuildAdjustedMap(builder, bundle_options, progress);
+  Result<LineMap> map = builder->Build(progress);
+  if (!map) return map.error();
+  return AdjustedMap{*std::move(map)};
+}
+
+Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, const AdjustedMap& built,
+               double seconds) {
+  const std::optional<PoseChange>& change = built.map.pose_change;
+  const double cm = change ? 100.0 * change->position_m : 0.0;
+  const double deg = change ? 180.0 / std::numbers::pi * change->rotation_rad : 0.0;
   if (!options.json) {
     char text[200];
     std::snprintf(text, sizeof(text),
@@ -101,7 +133,15 @@ Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, doubl
                   "%.1f s\n",
                   stats.num_lines, stats.num_multi_view_lines, stats.num_segments,
                   stats.num_key_frames, seconds);
-    return PrintText(options.out + ": " + text);
+    std::string report = options.out + ": " + text;
+    if (change) {
+      std::snprintf(text, sizeof(text),
+                    "poses adjusted by %.2f cm, %.3f deg (median); segments lie %.2f px from their "
+                    "lines, before %.2f px\n",
+                    cm, deg, built.after_px, built.before_px);
+      report += text;
+    }
+    return PrintText(report);
   }
   Json report = NewReport("map_build");
   report["map"] = options.out;
@@ -112,12 +152,20 @@ Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, doubl
   report["filtered"] = stats.num_filtered;
   report["lines"] = stats.num_lines;
   report["multi_view_lines"] = stats.num_multi_view_lines;
+  if (change) {
+    report["poses_adjusted_cm"] = Rounded(cm, 3);
+    report["poses_adjusted_deg"] = Rounded(deg, 4);
+    report["line_distance_before_px"] = Rounded(built.before_px, 3);
+    report["line_distance_after_px"] = Rounded(built.after_px, 3);
+  }
   report["seconds"] = Rounded(seconds, 3);
   return PrintJson(report);
 }
 
 Outcome RunMapBuild(const MapBuildOptions& options) {
   const auto start = std::chrono::steady_clock::now();
+  BundleOptions bundle_options;
+  if (Outcome failed = ReadPoseSigma(options, &bundle_options)) return failed;
   if (Outcome failed = CheckReplaceable(options.out, "manifest.json")) return failed;
   TumSequence sequence;
   std::vector<SequenceFrame> frames;
@@ -142,23 +190,21 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
       progress.Advance();
     }
   }
-  Result<LineMap> map = [&] {
-    ProgressBar progress("fuse lines", 100);
-    size_t percent = 0;
-    return builder.Build([&](double done) {
-      for (; static_cast<double>(percent) < 100.0 * done; ++percent) progress.Advance();
-    });
-  }();
-  if (!map) return FailureFrom(map.error());
-  if (options.calibrate) Calibrate(&*map);
+  Result<AdjustedMap> built = Fuse(options, bundle_options, &builder);
+  if (!built) return FailureFrom(built.error());
+  LineMap& map = built->map;
+  if (options.adjust_poses && !map.pose_change) {
+    PrintRemark("no line is seen by two key frames, poses stay as they are");
+  }
+  if (options.calibrate) Calibrate(&map);
   WriteMapOptions write_options;
   write_options.overwrite = true;
-  if (const Status written = WriteMap(*map, options.out, write_options); !written) {
+  if (const Status written = WriteMap(map, options.out, write_options); !written) {
     const bool io = written.error().code == ErrorCode::kIoError;
     return Failure{io ? kExitIo : kExitCannotCreate, written.error().message};
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  return Report(options, builder.stats(), seconds.count());
+  return Report(options, builder.stats(), *built, seconds.count());
 }
 
 }  // namespace
@@ -188,6 +234,14 @@ void AddMapBuild(CLI::App& map, PendingRun& pending) {
             "--calibrate,!--no-calibrate", options.calibrate,
             "Fit the covariance of poses to how well the key frames agree with each other (on by "
             "default)");
+        command.add_flag("--adjust-poses", options.adjust_poses,
+                         "Adjust the key frames' poses together with the lines, for poses that are "
+                         "known less well than a pixel");
+        command
+            .add_option("--pose-sigma", options.pose_sigma,
+                        "How well the poses are known: deviations in centimetres and degrees, "
+                        "CM,DEG")
+            ->capture_default_str();
         command.add_flag("--json", options.json, "Print what was built as JSON");
         command.footer(
             "Examples:\n"

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -63,6 +64,11 @@ Json Describe(const std::string& path, const LineMap& map) {
   report["points"] = num_points;
   report["covariance_factor"] = map.covariance_factor;
   report["covariance_growth"] = map.covariance_growth;
+  if (map.pose_change) {
+    report["poses_adjusted_cm"] = Rounded(100.0 * map.pose_change->position_m, 3);
+    report["poses_adjusted_deg"] =
+        Rounded(180.0 / std::numbers::pi * map.pose_change->rotation_rad, 4);
+  }
   if (!map.lines.empty()) {
     report["median_sigma_m"] = Rounded(Percentile(sigma_m, 50.0), 6);
     report["min_m"] = {Rounded(low.x(), 3), Rounded(low.y(), 3), Rounded(low.z(), 3)};

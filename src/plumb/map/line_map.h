@@ -56,6 +56,11 @@ struct KeyFrame {
   std::vector<MapPoint> points;
 };
 
+/// How far key-frame poses were moved: medians over the key frames.
+struct PoseChange {
+  double position_m = 0.0, rotation_rad = 0.0;
+};
+
 /// Plain data; MapIndex answers queries over it, map_file reads and writes it.
 struct LineMap {
   std::vector<MapLine> lines;
@@ -68,6 +73,8 @@ struct LineMap {
   /// Factor on the pose covariance: covariance_factor + covariance_growth x distance to the nearest
   /// key frames [m + rad] (CovarianceFactor()). 1 and 0 when not calibrated.
   double covariance_factor = 1.0, covariance_growth = 0.0;
+  /// Set when the key frames' poses were adjusted together with the lines, from those given.
+  std::optional<PoseChange> pose_change;
 
   std::span<const LineSighting> SightingsOf(uint32_t line) const {
     return std::span(sightings).subspan(sighting_begin[line],

@@ -11,6 +11,10 @@ namespace {
 
 constexpr double kUnitTolerance = 1e-3;  // of a quaternion's norm
 
+bool IsPose(const Rigid3& pose) {
+  return pose.IsFinite() && std::abs(pose.rotation.norm() - 1.0) <= kUnitTolerance;
+}
+
 Status Validate(const KeyFrameInput& frame) {
   const auto invalid = [&frame](const std::string& what) {
     return Error{ErrorCode::kInvalidArgument,
@@ -62,6 +66,27 @@ Status MapBuilder::AddKeyFrame(KeyFrameInput frame) {
   ++stats_.num_key_frames;
   stats_.num_segments += frame.segments.size();
   stats_.num_lifted += added.segments.size();
+  return Ok();
+}
+
+Status MapBuilder::SetPoses(std::span<const Rigid3> cam_from_world) {
+  if (cam_from_world.size() != key_frames_.size() ||
+      !std::all_of(cam_from_world.begin(), cam_from_world.end(), IsPose)) {
+    return Error{ErrorCode::kInvalidArgument, "not one valid pose for each key frame"};
+  }
+  for (size_t k = 0; k < key_frames_.size(); ++k) {
+    KeyFrame& frame = key_frames_[k];
+    const Rigid3 pose{cam_from_world[k].rotation.normalized(), cam_from_world[k].translation};
+    const Rigid3 new_from_old = pose.Inverse() * frame.cam_from_world;
+    for (LiftedSegment& segment : frame.segments) {
+      Segment3& lifted = segment.segment_in_world;
+      lifted = {new_from_old * lifted.start, new_from_old * lifted.end};
+    }
+    for (MapPoint& point : frame.points) {
+      point.point_in_world = (new_from_old * point.point_in_world.cast<double>()).cast<float>();
+    }
+    frame.cam_from_world = pose;
+  }
   return Ok();
 }
 

@@ -60,7 +60,12 @@ class MapBuilder {
   ///         this timestamp was added before. The message names the frame by its timestamp.
   Status AddKeyFrame(KeyFrameInput frame);
 
-  /// Fuses everything added so far; may be called again after more frames.
+  /// Moves the key frames, in the order in which they were added, and all that was lifted in them.
+  /// @return kInvalidArgument, and the builder is unchanged, unless there is one valid pose for
+  ///         each key frame.
+  Status SetPoses(std::span<const Rigid3> cam_from_world);
+
+  /// Fuses everything added so far; may be called again after more frames or new poses.
   /// @return kInvalidArgument when no key frame was added. A map without lines is not an error.
   Result<LineMap> Build(const MapBuildProgress& progress = {});
 

@@ -161,6 +161,11 @@ Status CheckMap(const LineMap& map) {
                                                   std::to_string(map.covariance_growth) +
                                                   ", not a number from 0"};
   }
+  const auto is_length = [](double value) { return std::isfinite(value) && value >= 0.0; };
+  if (map.pose_change &&
+      !(is_length(map.pose_change->position_m) && is_length(map.pose_change->rotation_rad))) {
+    return Error{ErrorCode::kInvalidArgument, "The change of the poses is not a number from 0"};
+  }
   if (map.detector.size() > kMaxDetectorBytes || !IsUtf8(map.detector)) {
     return Error{ErrorCode::kInvalidArgument,
                  "The detector's name is longer than 1024 bytes or not UTF-8"};

@@ -12,7 +12,8 @@ namespace plumb {
 ///   variance; 1 <= num_observing <= num_expected
 /// - sightings: key frames of one line strictly ascending, unit directions, distances > 0
 /// - key frames: unit quaternions, valid cameras; scores in [0, 1]; LiftedSegment::line exists
-/// - covariance_factor > 0; covariance_growth >= 0; `detector` is at most 1024 bytes of UTF-8
+/// - covariance_factor > 0; covariance_growth and pose_change >= 0
+/// - `detector` is at most 1024 bytes of UTF-8
 /// @return kInvalidArgument naming the first offender.
 Status CheckMap(const LineMap& map);
 

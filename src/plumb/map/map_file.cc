@@ -168,12 +168,14 @@ Status WriteMap(const LineMap& map, const std::string& directory, const WriteMap
   if (!decoded) return decoded.error();
   decoded->covariance_factor = map.covariance_factor;
   decoded->covariance_growth = map.covariance_growth;
+  decoded->pose_change = map.pose_change;
   if (Status status = CheckMap(*decoded); !status) return status;
 
   MapManifest manifest = DescribeTiles(tiles);
   manifest.detector = map.detector;
   manifest.covariance_factor = map.covariance_factor;
   manifest.covariance_growth = map.covariance_growth;
+  manifest.pose_change = map.pose_change;
   manifest.origin = origin;
 
   const size_t end = directory.find_last_not_of('/');
@@ -216,6 +218,7 @@ Result<LineMap> ReadMap(const std::string& directory) {
   map->detector = manifest->detector;
   map->covariance_factor = manifest->covariance_factor;
   map->covariance_growth = manifest->covariance_growth;
+  map->pose_change = manifest->pose_change;
   if (const Status status = CheckMap(*map); !status) {
     return in_file({ErrorCode::kCorruptData, status.error().message});
   }

@@ -136,6 +136,13 @@ Result<MapManifest> ParseMembers(const Json& root) {
     manifest.covariance_growth = *growth;
   }
 
+  if (const Json* member = Member(root, "pose_change")) {  // only of adjusted maps
+    const auto position = NumberOf(Member(*member, "position_m"));
+    const auto rotation = NumberOf(Member(*member, "rotation_rad"));
+    if (!position || !rotation) return Corrupt("has a pose_change without its two numbers");
+    manifest.pose_change = PoseChange{*position, *rotation};
+  }
+
   const Json* origin = Member(root, "origin");
   if (origin == nullptr || !origin->is_array() || origin->size() != 3) {
     return Corrupt("has no origin of three numbers");
@@ -182,14 +189,18 @@ std::string WriteManifest(const MapManifest& manifest) {
                      {"bytes", tile.bytes},
                      {"xxh3", Hex(tile.xxh3)}});
   }
-  const Json root = {
+  Json root = {
       {"schema", kMapSchema},
       {"detector", manifest.detector},
       {"covariance_factor", manifest.covariance_factor},
       {"covariance_growth", manifest.covariance_growth},
-      {"origin", {manifest.origin.x(), manifest.origin.y(), manifest.origin.z()}},
-      {"tiles", std::move(tiles)},
   };
+  if (manifest.pose_change) {
+    root["pose_change"] = {{"position_m", manifest.pose_change->position_m},
+                           {"rotation_rad", manifest.pose_change->rotation_rad}};
+  }
+  root["origin"] = {manifest.origin.x(), manifest.origin.y(), manifest.origin.z()};
+  root["tiles"] = std::move(tiles);
   std::string text = root.dump(2, ' ', false, Json::error_handler_t::replace);
   text.resize(text.size() - 2);  // "\n}"
   text += ",\n";

@@ -3,12 +3,14 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include <Eigen/Core>
 
 #include "plumb/base/result.h"
+#include "plumb/map/line_map.h"
 #include "plumb/map/map_tiles.h"
 
 namespace plumb {
@@ -25,6 +27,7 @@ struct TileEntry {
 struct MapManifest {
   std::string detector;
   double covariance_factor = 1.0, covariance_growth = 0.0;
+  std::optional<PoseChange> pose_change;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::array<TileEntry, kNumTileKinds> tiles;  // in the order of TileKind
 };

@@ -304,6 +304,62 @@ TEST(MapBuilder, MovedPosesTakeAllThatTheirFramesHoldAlong) {
   EXPECT_FALSE(builder.SetPoses(poses).has_value());
 }
 
+MapBuilderOptions WithoutDepth() {
+  MapBuilderOptions options;
+  options.depth_source = DepthSource::kViews;
+  return options;
+}
+
+TEST(MapBuilderWithoutDepth, FusesEachLineThatTheMotionTells) {
+  const Scene scene = Room();
+  Recording recording = Record(scene, Path(9), 0.3);
+  for (KeyFrameInput& frame : recording.frames) frame.depth = {};
+  const LineMap map = BuildMap(recording, WithoutDepth());
+  EXPECT_EQ(map.depth_source, DepthSource::kViews);
+  // Lines 0 and 1 are nearly parallel to the path.
+  for (const size_t i : {2u, 3u, 4u, 5u}) {
+    const MapLine* line = Find(map, scene.lines[i], 0.02);
+    ASSERT_NE(line, nullptr) << i;
+    EXPECT_GE(line->num_observing, 3u);
+    EXPECT_GT(line->segment_in_world.Length(), 0.8 * scene.lines[i].Length());
+    EXPECT_LT(line->segment_in_world.Length(), 1.1 * scene.lines[i].Length());
+    const double sigma = std::sqrt(line->covariance_start.trace());
+    EXPECT_LT(DistanceFromLine(scene.lines[i], line->segment_in_world.start), 4.0 * sigma);
+  }
+  for (const MapLine& line : map.lines) EXPECT_GE(line.num_observing, 3u);
+  ExpectConsistent(map);
+}
+
+TEST(MapBuilderWithoutDepth, OneViewOrOnePlaceGivesNoLines) {
+  for (const size_t count : {1u, 2u, 7u}) {
+    std::vector<Rigid3> poses(count, Path(5)[2]);
+    for (size_t k = 0; k < count; ++k) {
+      const Eigen::Quaterniond turn = ExpSo3({0.0, 0.04 * static_cast<double>(k), 0.0});
+      poses[k] = Rigid3{turn, Eigen::Vector3d::Zero()} * poses[k];
+    }
+    const LineMap map = BuildMap(Record(Room(), poses, 0.3), WithoutDepth());
+    EXPECT_TRUE(map.lines.empty());
+    EXPECT_EQ(map.key_frames.size(), count);
+    ExpectConsistent(map);
+  }
+}
+
+TEST(MapBuilderWithoutDepth, BuildsAgainAfterMoreFrames) {
+  const Recording recording = Record(Room(), Path(9), 0.3);
+  MapBuilder builder(WithoutDepth());
+  std::vector<double> progress;
+  for (size_t k = 0; k < recording.frames.size(); ++k) {
+    ASSERT_TRUE(builder.AddKeyFrame(recording.frames[k]).has_value());
+    progress.clear();
+    ASSERT_TRUE(builder.Build([&progress](double done) { progress.push_back(done); }).has_value());
+    EXPECT_TRUE(std::is_sorted(progress.begin(), progress.end()));
+    EXPECT_EQ(progress.back(), 1.0);
+  }
+  const LineMap at_once = BuildMap(recording, WithoutDepth());
+  EXPECT_EQ(builder.stats().num_lines, at_once.lines.size());
+  EXPECT_EQ(builder.stats().num_segments, 9 * Room().lines.size());
+}
+
 TEST(MapBuilder, KeepsWhatTheCallerAttaches) {
   Recording recording = Record(Room(), Path(2), 0.0);
   recording.frames[1].points.resize(3);

@@ -39,6 +39,7 @@ void WriteUnchecked(const LineMap& map, const std::string& directory) {
   const MapTiles tiles = EncodeTiles(map, origin);
   MapManifest manifest = DescribeTiles(tiles);
   manifest.detector = map.detector;
+  manifest.depth_source = map.depth_source;
   manifest.covariance_factor = map.covariance_factor;
   manifest.covariance_growth = map.covariance_growth;
   manifest.pose_change = map.pose_change;
@@ -75,6 +76,7 @@ TEST_F(MapFileTest, KeepsEverythingWithinFloatOfTheOrigin) {
   ASSERT_TRUE(read) << read.error().message;
 
   EXPECT_EQ(read->detector, map.detector);
+  EXPECT_EQ(read->depth_source, map.depth_source);
   EXPECT_EQ(read->covariance_factor, map.covariance_factor);
   EXPECT_EQ(read->covariance_growth, map.covariance_growth);
   ASSERT_TRUE(read->pose_change);
@@ -236,6 +238,16 @@ TEST_F(MapFileTest, SaysThatAnotherVersionIsUnsupported) {
   EXPECT_THAT(read.error().message, HasSubstr("plumb.map/2"));
 }
 
+TEST_F(MapFileTest, AMapThatDoesNotSayItsDepthHasASensors) {
+  LineMap map;
+  ASSERT_TRUE(WriteMap(map, path_));
+  const std::string manifest = path_ + "/manifest.json";
+  Spill(manifest, Reseal(Slurp(manifest), "  \"depth\": \"sensor\",\n", ""));
+  const Result<LineMap> read = ReadMap(path_);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->depth_source, DepthSource::kSensor);
+}
+
 TEST_F(MapFileTest, RefusesHostileManifests) {
   ASSERT_TRUE(WriteMap(MakeRandomMap({2, 2, 2, 1}, /*seed=*/9, {0, 0, 0}), path_));
   const std::string path = path_ + "/manifest.json", good = Slurp(path);
@@ -271,6 +283,8 @@ TEST_F(MapFileTest, RefusesHostileManifests) {
       {"a change of poses that is text", "\"rotation_rad\": 0.002", "\"rotation_rad\": \"2\""},
       {"a negative change of poses", "\"position_m\": 0.004", "\"position_m\": -0.004"},
       {"a growth that is null", "\"covariance_growth\": 0.75", "\"covariance_growth\": null"},
+      {"a depth of another kind", "\"views\"", "\"sonar\""},
+      {"a depth that is a number", "\"views\"", "7"},
       {"a detector that is a number", "\"lsd\"", "7"},
       {"a detector that is not UTF-8", "\"lsd\"", "\"\xff\xfe\""},
       {"a huge detector", "\"lsd\"", "\"" + std::string(5000, 'x') + "\""},

@@ -25,6 +25,7 @@ inline LineMap MakeRandomMap(const RandomMapSize& size, unsigned seed,
   };
   LineMap map;
   map.detector = "lsd";
+  map.depth_source = DepthSource::kViews;
   map.covariance_factor = 2.25;
   map.covariance_growth = 0.75;
   map.pose_change = PoseChange{0.004, 0.002};

@@ -108,8 +108,9 @@ LineResiduals EvaluateLine(const AnchoredLine& line, const LineObservation& obse
 void LineSystem::Add(const AnchoredLine& line, const LineObservation& observation,
                      const LineFitOptions& options) {
   const LineResiduals residuals = EvaluateLine(line, observation, options.pixel_sigma_px);
-  const Eigen::Matrix<double, 6, 1> weight =
+  Eigen::Matrix<double, 6, 1> weight =
       (1.0 + (residuals.value.array() / options.cauchy_scale).square()).inverse();
+  if (!options.lifted_ends_count) weight.tail<4>().setZero();
   const Eigen::Matrix<double, 6, 4> weighted = weight.asDiagonal() * residuals.jacobian;
   information.noalias() += residuals.jacobian.transpose() * weighted;
   gradient.noalias() += weighted.transpose() * residuals.value;

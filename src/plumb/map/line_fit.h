@@ -31,6 +31,8 @@ struct LineFitOptions {
   double pixel_sigma_px = 0.7;  // of a detected end point across the segment
   double cauchy_scale = 2.0;    // in standard deviations
   int iterations = 4;
+  /// False: lifted end points are no measurements, since they come from the segments themselves.
+  bool lifted_ends_count = true;
 };
 
 using Matrix4d = Eigen::Matrix<double, 4, 4>;

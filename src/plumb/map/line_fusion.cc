@@ -61,7 +61,7 @@ std::vector<MapLine> FuseLines(const LineFusionOptions& options, const PnpFilter
   }
   std::vector<MapLine> lines;
   for (LineTrack& track : tracks) {
-    if (track.observations.empty()) continue;
+    if (CountFrames(table, track.observations) < options.min_key_frames) continue;
     const std::optional<FittedLine> fitted = RefineTrack(table, options.fit, &track);
     if (!fitted) continue;
     for (const uint32_t id : track.observations) {

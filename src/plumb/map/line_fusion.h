@@ -1,6 +1,7 @@
 // Fuses the lifted segments of all key frames into lines.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -17,11 +18,12 @@ struct LineFusionOptions {
   AssociationGate settle{0.05, 2.5, 0.4, 0.004};  // all frames, on refined lines
   LineFitOptions fit;
   DepthNoise depth_noise;
+  uint32_t min_key_frames = 1;  // that must have observed a line
 };
 
 /// Lines of all key frames, longest tracks first. Sets `line` of every lifted segment (nullopt when
-/// the PnP filter rejected it) and of each line everything but num_expected, which is
-/// num_observing. Deterministic.
+/// the PnP filter rejected it or its line has too few key frames) and of each line everything but
+/// num_expected, which is num_observing. Deterministic.
 ///
 /// @param key_frames     Their segments are the observations; several of a frame may join one line.
 /// @param progress       Called with 0..1, may be empty.

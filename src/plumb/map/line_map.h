@@ -13,6 +13,7 @@
 #include "plumb/geometry/camera.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
+#include "plumb/map/depth_source.h"
 
 namespace plumb {
 
@@ -33,8 +34,9 @@ struct LineSighting {
   float distance_m = 0.0f;
 };
 
-/// A segment of one key frame with the 3D segment that its own depth gives it. The last step of
-/// the refinement uses these, not the fused lines (they agree better with their neighbourhood).
+/// A segment of one key frame with the 3D segment that its own depth, or views near it, give it.
+/// The last step of the refinement uses these, not the fused lines (they agree better with their
+/// neighbourhood).
 struct LiftedSegment {
   Segment2 segment_px;
   Segment3 segment_in_world;
@@ -70,6 +72,7 @@ struct LineMap {
   std::vector<KeyFrame> key_frames;
   /// Detector that made the segments; a query should use the same one.
   std::string detector;
+  DepthSource depth_source = DepthSource::kSensor;
   /// Factor on the pose covariance: covariance_factor + covariance_growth x distance to the nearest
   /// key frames [m + rad] (CovarianceFactor()). 1 and 0 when not calibrated.
   double covariance_factor = 1.0, covariance_growth = 0.0;

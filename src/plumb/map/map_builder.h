@@ -1,4 +1,5 @@
-// Builds a line map from posed RGB-D key frames: lift, fuse over the views, filter, visibility.
+// Builds a line map from posed key frames, with depth or without: lift, fuse over the views,
+// filter, visibility.
 #pragma once
 
 #include <cstdint>
@@ -9,29 +10,33 @@
 #include <vector>
 
 #include "plumb/base/result.h"
+#include "plumb/map/depth_source.h"
 #include "plumb/map/depth_view.h"
 #include "plumb/map/lift.h"
 #include "plumb/map/line_fusion.h"
 #include "plumb/map/line_map.h"
 #include "plumb/map/pnp_filter.h"
+#include "plumb/map/triangulation.h"
 
 namespace plumb {
 
 struct MapBuilderOptions {
-  LiftOptions lift;
+  DepthSource depth_source = DepthSource::kSensor;
+  LiftOptions lift;                    // with depth images
+  TriangulationOptions triangulation;  // without
   LineFusionOptions fusion;
   PnpFilterOptions pnp_filter;
   std::string detector;  // goes into the map: queries should use the same one
 };
 
-/// One posed RGB-D frame. Borrowed: segments and depth must outlive AddKeyFrame() only.
+/// One posed frame. Borrowed: segments and depth must outlive AddKeyFrame() only.
 struct KeyFrameInput {
   int64_t timestamp_ns = 0;
   Rigid3 cam_from_world;
   Camera camera;                         // of the segments; with a lens rectifier->ideal()
   const Rectifier* rectifier = nullptr;  // of a depth image with a lens; borrowed, too
   std::span<const Segment2> segments;    // [px], after SegmentRefiner
-  DepthView depth;                       // registered to the colour image
+  DepthView depth;                       // registered to the colour image; unused without depth
   std::vector<MapPoint> points;          // optional, for the point front-end; kept as they are
 };
 
@@ -54,7 +59,7 @@ class MapBuilder {
  public:
   explicit MapBuilder(MapBuilderOptions options = {});
 
-  /// Lifts the frame's segments.
+  /// With depth images: lifts the frame's segments. Without: keeps them for Build().
   /// @return kInvalidArgument, and the builder is unchanged, when the camera, the pose or the depth
   ///         image is invalid, the depth image has another size than the camera, or a frame with
   ///         this timestamp was added before. The message names the frame by its timestamp.
@@ -65,7 +70,9 @@ class MapBuilder {
   ///         each key frame.
   Status SetPoses(std::span<const Rigid3> cam_from_world);
 
-  /// Fuses everything added so far; may be called again after more frames or new poses.
+  /// Fuses everything added so far, without depth images triangulates it first; may be called again
+  /// after more frames or new poses. Without depth, a line has been seen by triangulation.min_views
+  /// at least.
   /// @return kInvalidArgument when no key frame was added. A map without lines is not an error.
   Result<LineMap> Build(const MapBuildProgress& progress = {});
 
@@ -73,8 +80,11 @@ class MapBuilder {
   const MapBuildStats& stats() const { return stats_; }
 
  private:
+  void Triangulate(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames);
+
   MapBuilderOptions options_;
   std::vector<KeyFrame> key_frames_;
+  std::vector<std::vector<Segment2>> segments_;  // of the key frames, without depth images
   std::unordered_set<int64_t> timestamps_;
   MapBuildStats stats_;
 };

@@ -173,6 +173,7 @@ Status WriteMap(const LineMap& map, const std::string& directory, const WriteMap
 
   MapManifest manifest = DescribeTiles(tiles);
   manifest.detector = map.detector;
+  manifest.depth_source = map.depth_source;
   manifest.covariance_factor = map.covariance_factor;
   manifest.covariance_growth = map.covariance_growth;
   manifest.pose_change = map.pose_change;
@@ -216,6 +217,7 @@ Result<LineMap> ReadMap(const std::string& directory) {
   Result<LineMap> map = DecodeTiles(*tiles, manifest->origin);
   if (!map) return in_file(map.error());
   map->detector = manifest->detector;
+  map->depth_source = manifest->depth_source;
   map->covariance_factor = manifest->covariance_factor;
   map->covariance_growth = manifest->covariance_growth;
   map->pose_change = manifest->pose_change;

@@ -127,6 +127,13 @@ Result<MapManifest> ParseMembers(const Json& root) {
   if (!detector) return Corrupt("has no detector");
   manifest.detector = *detector;
 
+  if (Member(root, "depth") != nullptr) {  // absent in older maps
+    const auto depth = TextOf(root, "depth");
+    const auto source = depth ? DepthSourceOf(*depth) : std::nullopt;
+    if (!source) return Corrupt("has a depth that is neither sensor nor views");
+    manifest.depth_source = *source;
+  }
+
   const auto factor = NumberOf(Member(root, "covariance_factor"));
   if (!factor) return Corrupt("has no covariance_factor");
   manifest.covariance_factor = *factor;
@@ -192,6 +199,7 @@ std::string WriteManifest(const MapManifest& manifest) {
   Json root = {
       {"schema", kMapSchema},
       {"detector", manifest.detector},
+      {"depth", NameOf(manifest.depth_source)},
       {"covariance_factor", manifest.covariance_factor},
       {"covariance_growth", manifest.covariance_growth},
   };

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "plumb/base/result.h"
+#include "plumb/map/depth_source.h"
 #include "plumb/map/line_map.h"
 #include "plumb/map/map_tiles.h"
 
@@ -26,6 +27,7 @@ struct TileEntry {
 
 struct MapManifest {
   std::string detector;
+  DepthSource depth_source = DepthSource::kSensor;
   double covariance_factor = 1.0, covariance_growth = 0.0;
   std::optional<PoseChange> pose_change;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();

@@ -108,7 +108,7 @@ class Evaluation {
 Outcome SelectPairs(const EvalRepeatabilityOptions& options, TumSequence* out_sequence,
                     std::vector<size_t>* out_firsts) {
   std::vector<SequenceFrame> listed;
-  if (Outcome failed = SelectPosedFrames(options.sequence, options.frames, out_sequence, &listed)) {
+  if (Outcome failed = SelectPosedFrames(options.sequence, options.frames, true, out_sequence, &listed)) {
     return failed;
   }
   const auto step = static_cast<size_t>(options.step);
@@ -126,7 +126,7 @@ Outcome SelectPairs(const EvalRepeatabilityOptions& options, TumSequence* out_se
                                      std::to_string(step) + " later in the sequence"};
   }
   std::ranges::sort(*out_firsts);
-  return CheckPosed(options.sequence, partners);
+  return CheckPosed(options.sequence, partners, true);
 }
 
 Json Describe(const Figures& figures) {

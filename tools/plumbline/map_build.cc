@@ -1,4 +1,4 @@
-// plumbline map build: a line map from posed RGB-D key frames.
+// plumbline map build: a line map from posed key frames, with depth images or without.
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -20,6 +20,7 @@
 #include "tools/plumbline/frame_run.h"
 #include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
+#include "tools/plumbline/key_frame_source.h"
 #include "tools/plumbline/output_directory.h"
 #include "tools/plumbline/point_front_end.h"
 #include "tools/plumbline/posed_frames.h"
@@ -28,13 +29,21 @@ namespace plumb::tools {
 namespace {
 
 struct MapBuildOptions {
-  std::string sequence, frames, out;
+  std::string sequence, frames, colmap, images, out;
   DetectorOptions detector;
-  std::string points = "opencv";
+  std::string depth;   // empty: sensor for a sequence, views for a COLMAP model
+  std::string points;  // empty: opencv where there is depth
   bool calibrate = true;
   bool adjust_poses = false;
   std::string pose_sigma = "0.5,0.1";  // cm, deg
   bool json = false;
+
+  DepthSource Source() const {
+    if (depth.empty()) return colmap.empty() ? DepthSource::kSensor : DepthSource::kViews;
+    return *DepthSourceOf(depth);
+  }
+  bool WithDepth() const { return Source() == DepthSource::kSensor; }
+  bool WithPoints() const { return points.empty() ? WithDepth() : points == "opencv"; }
 };
 
 /// A key frame with all that its KeyFrameInput borrows.
@@ -47,17 +56,21 @@ struct LoadedKeyFrame {
 /// Reads the images of key frames, detects and refines their segments.
 class KeyFrameReader {
  public:
-  KeyFrameReader(const TumSequence& sequence, LineDetector* detector, bool with_points)
-      : sequence_(sequence),
+  KeyFrameReader(const KeyFrameSource& source, LineDetector* detector, bool with_depth,
+                 bool with_points)
+      : source_(source),
         detector_(detector),
+        with_depth_(with_depth),
         with_points_(with_points),
         refiner_(SegmentRefinerOptions{}) {}
 
-  Outcome Read(const SequenceFrame& frame, LoadedKeyFrame* out) {
-    const Camera& camera = sequence_.camera;
+  Outcome Read(size_t index, LoadedKeyFrame* out) {
+    const SequenceFrame& frame = source_.frames[index];
+    const Rectifier& rectifier = source_.rectifiers[source_.rectifier_of[index]];
     RgbdImages images;
-    const Rectifier& rectifier = sequence_.rectifier;
-    if (Outcome failed = ReadRgbdImages(frame, rectifier.image_camera().pinhole, &images)) {
+    const Camera& taken = rectifier.image_camera().pinhole;
+    if (Outcome failed = with_depth_ ? ReadRgbdImages(frame, taken, &images)
+                                     : ReadFrameImage(frame, taken, &images.color)) {
       return failed;
     }
     out->depth = images.depth;
@@ -69,10 +82,10 @@ class KeyFrameReader {
     KeyFrameInput& input = out->input;
     input.timestamp_ns = frame.timestamp_ns;
     input.cam_from_world = *frame.cam_from_world;
-    input.camera = camera;
+    input.camera = rectifier.ideal();
     input.rectifier = &rectifier;
     input.segments = out->segments;
-    input.depth = ViewOfDepth(out->depth, sequence_.depth_scale);
+    if (with_depth_) input.depth = ViewOfDepth(out->depth, source_.depth_scale);
     if (!with_points_) return std::nullopt;
     Result<std::vector<MapPoint>> points =
         point_front_end_.KeyFramePoints(images.color, rectifier, input.cam_from_world, input.depth);
@@ -82,9 +95,9 @@ class KeyFrameReader {
   }
 
  private:
-  const TumSequence& sequence_;
+  const KeyFrameSource& source_;
   LineDetector* detector_;
-  bool with_points_;
+  bool with_depth_, with_points_;
   SegmentRefiner refiner_;
   PointFrontEnd point_front_end_;
 };
@@ -145,6 +158,7 @@ Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, const
   }
   Json report = NewReport("map_build");
   report["map"] = options.out;
+  report["depth"] = NameOf(options.Source());
   report["model"] = options.detector.model;
   report["key_frames"] = stats.num_key_frames;
   report["segments"] = stats.num_segments;
@@ -162,28 +176,53 @@ Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, const
   return PrintJson(report);
 }
 
+Outcome CheckOptions(const MapBuildOptions& options) {
+  const bool from_colmap = !options.colmap.empty() || !options.images.empty();
+  const bool complete = from_colmap ? !options.colmap.empty() && !options.images.empty()
+                                    : !options.sequence.empty() && !options.frames.empty();
+  if (!complete || (from_colmap && !(options.sequence.empty() && options.frames.empty()))) {
+    return Failure{kExitUsage, "want either --sequence and --frames or --colmap and --images"};
+  }
+  if (from_colmap && options.WithDepth()) {
+    return Failure{kExitUsage,
+                   "--depth sensor needs --sequence: a COLMAP model has no depth images"};
+  }
+  if (options.WithPoints() && !options.WithDepth()) {
+    return Failure{kExitUsage, "--points opencv needs depth images, --depth views has none"};
+  }
+  if (options.adjust_poses && !options.WithDepth()) {
+    return Failure{kExitUsage, "--adjust-poses needs depth images, --depth views has none"};
+  }
+  return std::nullopt;
+}
+
 Outcome RunMapBuild(const MapBuildOptions& options) {
   const auto start = std::chrono::steady_clock::now();
+  if (Outcome wrong = CheckOptions(options)) return wrong;
   BundleOptions bundle_options;
   if (Outcome failed = ReadPoseSigma(options, &bundle_options)) return failed;
   if (Outcome failed = CheckReplaceable(options.out, "manifest.json")) return failed;
-  TumSequence sequence;
-  std::vector<SequenceFrame> frames;
-  if (Outcome failed = SelectPosedFrames(options.sequence, options.frames, &sequence, &frames))
+  KeyFrameSource source;
+  if (Outcome failed =
+          options.colmap.empty()
+              ? OpenTumKeyFrames(options.sequence, options.frames, options.WithDepth(), &source)
+              : OpenColmapKeyFrames(options.colmap, options.images, &source)) {
     return failed;
+  }
   std::unique_ptr<LineDetector> detector;
   if (Outcome failed = CreateDetector(options.detector, &detector)) return failed;
 
   MapBuilderOptions builder_options;
   builder_options.detector = detector->Name();
+  builder_options.depth_source = options.Source();
   MapBuilder builder(builder_options);
   {
-    KeyFrameReader reader(sequence, detector.get(), options.points == "opencv");
-    ProgressBar progress("key frames", frames.size());
-    for (const SequenceFrame& frame : frames) {
+    KeyFrameReader reader(source, detector.get(), options.WithDepth(), options.WithPoints());
+    ProgressBar progress("key frames", source.frames.size());
+    for (size_t k = 0; k < source.frames.size(); ++k) {
       if (Outcome interrupted = CheckInterrupt()) return interrupted;
       LoadedKeyFrame loaded;
-      if (Outcome failed = reader.Read(frame, &loaded)) return failed;
+      if (Outcome failed = reader.Read(k, &loaded)) return failed;
       if (const Status added = builder.AddKeyFrame(std::move(loaded.input)); !added) {
         return Failure{kExitBadData, added.error().message};
       }
@@ -211,15 +250,21 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
 
 void AddMapBuild(CLI::App& map, PendingRun& pending) {
   AddCommand<MapBuildOptions>(
-      map, pending, "build", "Build a line map from posed RGB-D key frames",
+      map, pending, "build", "Build a line map from posed key frames",
       [](CLI::App& command, MapBuildOptions& options) {
+        command.add_option("--sequence", options.sequence,
+                           "Sequence in TUM RGB-D layout with camera.json");
+        command.add_option("--frames", options.frames,
+                           "File with the timestamps of the sequence's key frames");
+        command.add_option("--colmap", options.colmap,
+                           "Instead of a sequence: folder of a COLMAP model in metres "
+                           "(cameras and images, .bin or .txt)");
+        command.add_option("--images", options.images, "Folder of the COLMAP model's images");
         command
-            .add_option("--sequence", options.sequence,
-                        "Sequence in TUM RGB-D layout with camera.json")
-            ->required();
-        command
-            .add_option("--frames", options.frames, "File with the timestamps of the key frames")
-            ->required();
+            .add_option("--depth", options.depth,
+                        "sensor: the sequence's depth images; views: none, lines are triangulated "
+                        "from the key frames (default: sensor, with --colmap views)")
+            ->check(CLI::IsMember({"sensor", "views"}));
         BindDetectorOptions(command, options.detector);
         command
             .add_option("--out", options.out,
@@ -227,9 +272,9 @@ void AddMapBuild(CLI::App& map, PendingRun& pending) {
             ->required();
         command
             .add_option("--points", options.points,
-                        "opencv: keep SIFT points of every key frame for replay --points; or none")
-            ->check(CLI::IsMember({"none", "opencv"}))
-            ->capture_default_str();
+                        "opencv: keep SIFT points of every key frame for replay --points; or none "
+                        "(default: opencv, with --depth views none)")
+            ->check(CLI::IsMember({"none", "opencv"}));
         command.add_flag(
             "--calibrate,!--no-calibrate", options.calibrate,
             "Fit the covariance of poses to how well the key frames agree with each other (on by "
@@ -247,6 +292,7 @@ void AddMapBuild(CLI::App& map, PendingRun& pending) {
             "Examples:\n"
             "  plumbline map build --sequence office --frames office/map.txt --model nano --out "
             "office.map\n"
+            "  plumbline map build --colmap sparse/0 --images images --model nano --out hall.map\n"
             "  plumbline map info office.map");
       },
       RunMapBuild);

@@ -55,6 +55,7 @@ Json Describe(const std::string& path, const LineMap& map) {
   Json report = NewReport("map_info");
   report["map"] = path;
   report["detector"] = map.detector;
+  report["depth"] = NameOf(map.depth_source);
   report["bytes"] = BytesOnDisk(path);
   report["lines"] = map.lines.size();
   report["multi_view_lines"] = num_multi_view;

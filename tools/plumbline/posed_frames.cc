@@ -13,7 +13,7 @@ namespace {
 Outcome CheckSize(const std::string& path, const cv::Mat& image, const Camera& camera) {
   if (image.cols == camera.width_px && image.rows == camera.height_px) return std::nullopt;
   return Failure{kExitBadData, path + ": is " + std::to_string(image.cols) + " x " +
-                                   std::to_string(image.rows) + ", camera.json says " +
+                                   std::to_string(image.rows) + ", its camera " +
                                    std::to_string(camera.width_px) + " x " +
                                    std::to_string(camera.height_px)};
 }
@@ -21,37 +21,45 @@ Outcome CheckSize(const std::string& path, const cv::Mat& image, const Camera& c
 }  // namespace
 
 Outcome SelectPosedFrames(const std::string& sequence_directory, const std::string& list_path,
-                          TumSequence* out_sequence, std::vector<SequenceFrame>* out_frames) {
+                          bool with_depth, TumSequence* out_sequence,
+                          std::vector<SequenceFrame>* out_frames) {
   Result<TumSequence> sequence = ReadTumSequence(sequence_directory);
   if (!sequence) return FailureFrom(sequence.error());
   Result<std::vector<SequenceFrame>> frames = SelectFrames(*sequence, list_path);
   if (!frames) return FailureFrom(frames.error());
-  if (Outcome failed = CheckPosed(sequence_directory, *frames)) return failed;
+  if (Outcome failed = CheckPosed(sequence_directory, *frames, with_depth)) return failed;
   *out_sequence = *std::move(sequence);
   *out_frames = *std::move(frames);
   return std::nullopt;
 }
 
-Outcome CheckPosed(const std::string& sequence_directory,
-                   const std::vector<SequenceFrame>& frames) {
+Outcome CheckPosed(const std::string& sequence_directory, const std::vector<SequenceFrame>& frames,
+                   bool with_depth) {
   for (const SequenceFrame& frame : frames) {
     if (!frame.cam_from_world) {
       return Failure{kExitBadData, sequence_directory + "/groundtruth.txt: no pose for frame " +
                                        FormatTimestamp(frame.timestamp_ns)};
     }
   }
-  const Status exist = CheckFilesExist(frames, true);
+  const Status exist = CheckFilesExist(frames, with_depth);
   return exist ? Outcome() : FailureFrom(exist.error());
 }
 
-Outcome ReadRgbdImages(const SequenceFrame& frame, const Camera& camera, RgbdImages* out_images) {
+Outcome ReadFrameImage(const SequenceFrame& frame, const Camera& camera, cv::Mat* out_color) {
   Result<cv::Mat> color = ReadColorImage(frame.color_path);
   if (!color) return FailureFrom(color.error());
   if (Outcome failed = CheckSize(frame.color_path, *color, camera)) return failed;
+  *out_color = *std::move(color);
+  return std::nullopt;
+}
+
+Outcome ReadRgbdImages(const SequenceFrame& frame, const Camera& camera, RgbdImages* out_images) {
+  cv::Mat color;
+  if (Outcome failed = ReadFrameImage(frame, camera, &color)) return failed;
   Result<cv::Mat> depth = ReadDepthImage(*frame.depth_path);
   if (!depth) return FailureFrom(depth.error());
   if (Outcome failed = CheckSize(*frame.depth_path, *depth, camera)) return failed;
-  *out_images = {*std::move(color), *std::move(depth)};
+  *out_images = {std::move(color), *std::move(depth)};
   return std::nullopt;
 }
 

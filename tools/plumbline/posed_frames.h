@@ -12,13 +12,18 @@
 
 namespace plumb::tools {
 
-/// Reads a sequence and the list of some of its frames; both images and the pose of each must
-/// exist.
+/// Reads a sequence and the list of some of its frames; image, pose and, if wanted, depth image of
+/// each must exist.
 Outcome SelectPosedFrames(const std::string& sequence_directory, const std::string& list_path,
-                          TumSequence* out_sequence, std::vector<SequenceFrame>* out_frames);
+                          bool with_depth, TumSequence* out_sequence,
+                          std::vector<SequenceFrame>* out_frames);
 
 /// kExitBadData or kExitNoInput naming the first frame without a pose or an image file.
-Outcome CheckPosed(const std::string& sequence_directory, const std::vector<SequenceFrame>& frames);
+Outcome CheckPosed(const std::string& sequence_directory, const std::vector<SequenceFrame>& frames,
+                   bool with_depth);
+
+/// A colour image of the camera's size.
+Outcome ReadFrameImage(const SequenceFrame& frame, const Camera& camera, cv::Mat* out_color);
 
 /// A frame's images, of the camera's size.
 struct RgbdImages {

@@ -10,8 +10,7 @@ namespace plumb {
 namespace {
 
 constexpr double kUnitTolerance = 1e-3;  // of a quaternion's norm
-
-constexpr double kTriangulated = 0.5;  // share of the work that follows without depth images
+constexpr double kTriangulated = 0.5;    // share of the work that follows without depth images
 
 bool IsPose(const Rigid3& pose) {
   return pose.IsFinite() && std::abs(pose.rotation.norm() - 1.0) <= kUnitTolerance;

@@ -520,6 +520,10 @@ static void test_broken_frames(const fixture* f, const plumb_map* map) {
   EXPECT_REFUSED(frame.lens_model = PLUMB_LENS_RADTAN;
                  frame.lens_distortion[7] = NAN, "lens_distortion[7] nan");
   EXPECT_REFUSED(frame.lens_model = PLUMB_LENS_RADTAN; frame.lens_distortion[0] = -1e9, "camera");
+  EXPECT_REFUSED(frame.gravity_in_camera[0] = NAN, "gravity in the camera");
+  EXPECT_REFUSED(frame.gravity_in_camera[1] = 9.8, "gravity in the world (0, 0, 0)");
+  EXPECT_REFUSED(frame.gravity_in_camera[1] = 9.8; frame.gravity_in_world[1] = 1.0;
+                 frame.gravity_sigma_rad = -0.1, "gravity uncertainty -0.1");
 #undef EXPECT_REFUSED
   EXPECT_ERROR(plumb_session_submit_frame(session, NULL), PLUMB_ERROR_INVALID_ARGUMENT, "NULL");
   EXPECT_ERROR(plumb_session_submit_frame(NULL, &good), PLUMB_ERROR_INVALID_ARGUMENT, "session");

@@ -43,7 +43,8 @@ CHECK(frame_points, offsetof(plumb_frame, points_px) == 480);
 CHECK(frame_release, offsetof(plumb_frame, release) == 512);
 CHECK(frame_lens, offsetof(plumb_frame, lens_model) == 528);
 CHECK(frame_distortion, offsetof(plumb_frame, lens_distortion) == 536);
-CHECK(frame_size, sizeof(plumb_frame) == 600);
+CHECK(frame_gravity, offsetof(plumb_frame, gravity_in_camera) == 600);
+CHECK(frame_size, sizeof(plumb_frame) == 656);
 #endif
 
 CHECK(frame_result_index, offsetof(plumb_frame_result, frame_index) == 16);

@@ -75,6 +75,19 @@ TEST(SolvePaperCost, RecoversThePoseFromLines) {
   EXPECT_EQ(solution->num_points, 0);
 }
 
+TEST(SolvePaperCost, PerpendicularDistancesForgiveFragments) {
+  std::vector<PaperLine> fragments;
+  for (const LineObservation& overlap : Overlaps()) {
+    fragments.push_back({overlap.line_in_world, overlap.part_px, overlap.part_px.Length()});
+  }
+  ExpectAtTruth(SolvePaperCost(kCamera, Start(), fragments, {},
+                               {.paper_residual = LineResidual::kPerpendicular}));
+  // The midpoints of fragments are elsewhere.
+  const auto midpoints = SolvePaperCost(kCamera, Start(), fragments, {}, {});
+  ASSERT_TRUE(midpoints);
+  EXPECT_GT(DistanceBetween(midpoints->cam_from_world, Truth()).position_m, 0.01);
+}
+
 TEST(SolvePaperCost, RecoversThePoseFromPointsAlone) {
   ExpectAtTruth(SolvePaperCost(kCamera, Start(), {}, Points(), {}));
 }

@@ -183,6 +183,18 @@ TEST(PriorEquations, OneStepReturnsToThePrior) {
   EXPECT_LT(DistanceBetween(Perturb(start, *step), Pose()).position_m, 0.01);
 }
 
+TEST(PriorEquations, TiltIsHeldAcrossItsAxisOnly) {
+  PosePriorFactor prior{Pose(), 0.1, 0.2};
+  const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, 2) / 3.0;
+  const Eigen::Vector3d across = Eigen::Vector3d(2, 1, -2) / 3.0;
+  prior.tilt = TiltPrior{axis, 0.01};
+  const Eigen::Matrix3d information = prior.Information().topLeftCorner<3, 3>();
+  EXPECT_NEAR(axis.dot(information * axis), 1.0 / (0.1 * 0.1), 1e-9);
+  EXPECT_NEAR(across.dot(information * across), 1.0 / (0.01 * 0.01), 1e-8);
+  EXPECT_NEAR(axis.dot(information * across), 0.0, 1e-9);
+  EXPECT_NEAR(prior.Information()(3, 3), 25.0, 1e-9);
+}
+
 TEST(SolveStep, LimitsTheRotationAndKeepsTheDirection) {
   NormalEquations equations;
   equations.information = Matrix6d::Identity();

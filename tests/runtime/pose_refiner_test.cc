@@ -139,6 +139,32 @@ TEST(PoseRefiner, RandomSegmentsKeepThePriorAndItsCovariance) {
   }
 }
 
+TEST(PoseRefiner, GravityFindsWhatFewHypothesesMiss) {
+  Scene scene(testing::RoomLines(), {.num_hypotheses = 16});
+  Random random(11);
+  int found_without = 0, found_with = 0;
+  constexpr int kTrials = 24;
+  for (int k = 0; k < kTrials; ++k) {
+    const Rigid3 truth = QueryPose(k % 8);
+    const auto segments = Render(scene.lines, truth, 600 + k);
+    RefineInput input =
+        InputOf(segments, Disturb(truth, 0.3, 25.0 * kDegree, &random), 0.3, 25.0 * kDegree);
+    input.seed = static_cast<uint64_t>(k);
+    const auto is_found = [&] {
+      return DistanceBetween(scene.Refine(input).cam_from_world, truth).position_m < 0.02;
+    };
+    found_without += is_found();
+    input.prior.gravity =
+        GravityPrior{.down_in_camera = 9.8 * (truth.rotation * Eigen::Vector3d::UnitZ()),
+                     .down_in_world = Eigen::Vector3d::UnitZ(),
+                     .sigma_rad = 0.5 * kDegree};
+    found_with += is_found();
+  }
+  // 9 and 22 were found.
+  EXPECT_LT(found_without, kTrials / 2);
+  EXPECT_GT(found_with, kTrials * 3 / 4);
+}
+
 TEST(PoseRefiner, NoSegmentsIsLowSupport) {
   Scene scene(testing::RoomLines());
   const RefineResult result = scene.Refine(InputOf({}, QueryPose(0)));

@@ -121,6 +121,20 @@ TEST_F(StreamTrackerTest, ComesBackAfterTheHostRelocalised) {
   EXPECT_LE(frames, 3);
 }
 
+// One pose of the tracker is far off, and the next one is right again: a blunder, not a
+// relocalisation. The frame itself may be lost, the stream must not be.
+TEST_F(StreamTrackerTest, SurvivesAnOutlierOfTheTracker) {
+  for (int i = 0; i < 5; ++i) Track(i, Drifting(i));
+  const Rigid3 blunder{ExpSo3({0.0, 0.5, 0.1}), Eigen::Vector3d(1.0, -0.5, 0.7)};
+  const double at_blunder = Track(5, Drifting(5) * blunder);
+  EXPECT_TRUE(at_blunder < 0.01 || result_.status != RefineStatus::kRefined) << at_blunder;
+  Track(6, Drifting(6));
+  for (int i = 7; i < kNumFrames; ++i) {
+    EXPECT_LT(Track(i, Drifting(i)), 0.01) << "frame " << i;
+    EXPECT_EQ(ToString(result_.status), "REFINED") << "frame " << i;
+  }
+}
+
 TEST_F(StreamTrackerTest, ErrorLeavesTheStreamAsItWas) {
   Track(0, TruePose(0));
   const StreamState before = tracker_->state();

@@ -62,7 +62,7 @@ TEST(RotationSearch, KeepsTheRotationWhateverThePosition) {
     clusterer.Cluster(in_prior, 12, &clusters);
     std::vector<Eigen::Matrix3f> rotations;
     search.Search(camera, testing::Render(testing::RoomLines(), truth, 10 + k), clusters,
-                  {.num_draws = 1500, .num_kept = 24, .rotation_sigma_rad = 8.0 * kDegree}, &random,
+                  {.num_draws = 1500, .num_kept = 24, .spread = {.sigma_rad = static_cast<float>(8.0 * kDegree / std::sqrt(3.0))}}, &random,
                   &rotations);
     ASSERT_EQ(rotations.size(), 24u);
     double nearest = 10.0;
@@ -126,6 +126,21 @@ TEST(PoseSearch, EqualSeedsGiveEqualBits) {
     EXPECT_EQ(x[i].cam_from_world.translation, y[i].cam_from_world.translation);
     EXPECT_EQ(x[i].cam_from_world.rotation.coeffs(), y[i].cam_from_world.rotation.coeffs());
   }
+}
+
+TEST(RotationSpread, GravityLeavesTheTurnAboutIt) {
+  const Eigen::Vector3f axis = Eigen::Vector3f(2.0f, 3.0f, 6.0f) / 7.0f;
+  const RotationSpread spread{.sigma_rad = 0.1f, .axis = axis, .tilt_sigma_rad = 0.01f};
+  Random random(1);
+  double about = 0.0, across = 0.0;
+  constexpr int kDraws = 4000;
+  for (int i = 0; i < kDraws; ++i) {
+    const Eigen::Vector3f w = Draw(spread, &random);
+    about += std::pow(w.dot(axis), 2) / kDraws;
+    across += (w - w.dot(axis) * axis).squaredNorm() / kDraws;
+  }
+  EXPECT_NEAR(std::sqrt(about), 0.1, 0.005);
+  EXPECT_NEAR(std::sqrt(across / 2.0), 0.01, 0.0005);
 }
 
 TEST(PoseSearch, NothingIsFoundWithoutLinesOrSegments) {

@@ -44,6 +44,7 @@ TEST(Program, EveryCommandHasHelp) {
                               "map export",
                               "replay",
                               "eval",
+                              "eval ablation",
                               "eval controls",
                               "eval lines",
                               "eval repeatability",

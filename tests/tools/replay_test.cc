@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -156,6 +157,70 @@ TEST_F(Replay, PointsAloneRefine) {
   ExpectFailure(arguments, 64, "needs --points opencv");
 }
 
+TEST_F(Replay, AblationComparesEveryVariantWithTheTruth) {
+  const std::string arguments = "eval ablation --sequence " + room_->path() + " --frames " +
+                                (*room_ / "splits/query.txt") + " --map " + Map() +
+                                " --model lsd --points opencv --every 2 --priors " + Priors();
+  const ProgramRun run = RunPlumbline(arguments + ":5,1 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_EQ(report["frames"], kNumQueries / 2);
+  ASSERT_EQ(report["rows"].size(), 9u);
+  const json& product = report["rows"][4];
+  EXPECT_EQ(product["features"], "lines");
+  EXPECT_EQ(product["matching"], "search");
+  EXPECT_EQ(product["residual"], "perpendicular");
+  EXPECT_EQ(product["recall_5cm_5deg"], 1.0);
+  // Every variant must be one of its own.
+  EXPECT_NE(report["rows"][1]["median_cm"], report["rows"][2]["median_cm"]);
+  EXPECT_NE(report["rows"][3]["median_cm"], product["median_cm"]);
+  EXPECT_NE(report["rows"][7]["median_cm"], report["rows"][8]["median_cm"]);
+
+  const ProgramRun table = RunPlumbline(arguments + ":5,1");
+  EXPECT_THAT(table.out, HasSubstr("| 5,1 | joint | search | perpendicular | "));
+  const ProgramRun no_size = RunPlumbline(arguments);
+  EXPECT_EQ(no_size.exit_code, 64);
+  EXPECT_THAT(no_size.err, HasSubstr("want FILE:CM,DEG"));
+}
+
+TEST_F(Replay, GravityHasALineForEveryFrame) {
+  // Down in the camera is down in the world, turned by the priors' own rotations: nothing changes
+  // much, but it must be read.
+  std::string text;
+  std::istringstream lines(ReadAll(Priors()));
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    double v[8];
+    std::istringstream numbers(line);
+    std::string stamp;
+    numbers >> stamp;
+    for (int i = 0; i < 7; ++i) numbers >> v[i];
+    const Eigen::Vector3d down = Eigen::Quaterniond(v[6], v[3], v[4], v[5]).conjugate() *
+                                 Eigen::Vector3d(0.0, 0.0, -9.8);
+    std::ostringstream record;
+    record << stamp << ' ' << down.x() << ' ' << down.y() << ' ' << down.z() << '\n';
+    text += record.str();
+  }
+  const std::string file = dir_.Write("gravity.txt", text);
+  const std::string arguments =
+      ReplayArguments(Priors(), Map()) + " --overlays 0 --gravity " + file;
+  const ProgramRun run =
+      RunPlumbline(arguments + " --gravity-in-world 0,0,-1 --out " + (dir_ / "run"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(json::parse(run.out)["status"]["REFINED"], kNumQueries);
+
+  ExpectFailure(arguments, 64, "--gravity-in-world");
+  ExpectFailure(arguments + " --gravity-in-world 0,0,0", 64, "want a direction");
+  const std::string short_file = dir_.Write("short.txt", text.substr(0, text.find('\n')));
+  ExpectFailure(ReplayArguments(Priors(), Map()) + " --gravity-in-world 0,0,-1 --gravity " +
+                    short_file,
+                65, "has no line for frame");
+  const std::string bad_file = dir_.Write("bad.txt", "1.0 0 0\n");
+  ExpectFailure(ReplayArguments(Priors(), Map()) + " --gravity-in-world 0,0,-1 --gravity " +
+                    bad_file,
+                65, "bad.txt:1: want");
+}
+
 TEST_F(Replay, MapExportWritesPlyAndObj) {
   for (const auto& [name, begin] : {std::pair("lines.ply", "ply\n"), std::pair("lines.obj", "")}) {
     const ProgramRun run =
@@ -265,7 +330,7 @@ TEST_F(Replay, ANanInAPriorIsNamedByItsLine) {
 
 TEST_F(Replay, PriorsThatNameNoFrameAreRefused) {
   const std::string priors = dir_.Write("other.txt", "12345.0 0 0 0 0 0 0 1\n");
-  ExpectFailure(ReplayArguments(priors, Map()), 65, "names none of the 6 frames");
+  ExpectFailure(ReplayArguments(priors, Map()), 65, "names none of the 6 query frames");
 }
 
 TEST_F(Replay, AFrameWithoutAPriorIsNamed) {

@@ -10,6 +10,7 @@ void AddBenchNet(CLI::App& bench, PendingRun& pending);
 void AddBenchRefine(CLI::App& bench, PendingRun& pending);
 void AddDetect(CLI::App& program, PendingRun& pending);
 void AddDeviceList(CLI::App& device, PendingRun& pending);
+void AddEvalAblation(CLI::App& eval, PendingRun& pending);
 void AddEvalControls(CLI::App& eval, PendingRun& pending);
 void AddEvalLines(CLI::App& eval, PendingRun& pending);
 void AddEvalRepeatability(CLI::App& eval, PendingRun& pending);

@@ -2,7 +2,11 @@
 #include "tools/plumbline/frame_run.h"
 
 #include <algorithm>
+#include <map>
 #include <numbers>
+#include <optional>
+#include <span>
+#include <string_view>
 #include <utility>
 
 #include "plumb/map/map_file.h"
@@ -21,37 +25,6 @@ namespace {
 constexpr int64_t kSameFrameNs = 1'000'000;
 constexpr int64_t kWaitNs = 1'000'000'000;
 
-Outcome ReadPriors(const FrameRunOptions& options, FrameRun* run) {
-  double cm = 0.0, deg = 0.0;
-  if (Outcome failed = ParsePoseSize("--prior-size", options.prior_size, &cm, &deg)) return failed;
-  PosePrior prior;
-  prior.position_sigma_m = cm / 100.0;
-  prior.rotation_sigma_rad = deg * std::numbers::pi / 180.0;
-  const Result<Trajectory> poses = ReadTumTrajectory(options.priors);
-  if (!poses) return FailureFrom(poses.error());
-  size_t num_missing = 0;
-  int64_t first_missing_ns = 0;
-  for (const SequenceFrame& frame : run->frames) {
-    const StampedPose* pose = NearestPose(*poses, frame.timestamp_ns, kSameFrameNs);
-    if (pose == nullptr) {
-      if (num_missing++ == 0) first_missing_ns = frame.timestamp_ns;
-      continue;
-    }
-    prior.cam_from_world = pose->cam_from_world;
-    run->priors.push_back(prior);
-  }
-  if (num_missing == run->frames.size()) {
-    return Failure{kExitBadData, options.priors + ": names none of the " +
-                                     std::to_string(num_missing) + " frames of " + options.frames};
-  }
-  if (num_missing > 0) {
-    return Failure{kExitBadData, options.priors + ": no pose for " + std::to_string(num_missing) +
-                                     " of the " + std::to_string(run->frames.size()) +
-                                     " frames, the first is " + FormatTimestamp(first_missing_ns)};
-  }
-  return std::nullopt;
-}
-
 /// Finds nothing: what is left of a run without lines are its points.
 class NoLines final : public LineDetector {
  public:
@@ -66,6 +39,53 @@ Outcome ChooseDetector(const FrameRunOptions& options, std::unique_ptr<LineDetec
     return Failure{kExitUsage, "--model none: needs --points opencv, nothing is left otherwise"};
   }
   *out = std::make_unique<NoLines>();
+  return std::nullopt;
+}
+
+std::optional<Eigen::Vector3d> ParseVector3(std::span<const std::string_view> fields) {
+  Eigen::Vector3d v;
+  if (fields.size() != 3) return std::nullopt;
+  for (int i = 0; i < 3; ++i) {
+    const Result<double> number = ParseNumber(fields[static_cast<size_t>(i)]);
+    if (!number) return std::nullopt;
+    v[i] = *number;
+  }
+  return v;
+}
+
+/// Gives every prior its gravity.
+Outcome ReadGravity(const FrameRunOptions& options, FrameRun* run) {
+  GravityPrior gravity;
+  gravity.sigma_rad = options.gravity_sigma_deg * std::numbers::pi / 180.0;
+  const std::vector<DataLine> world = DataLines(options.gravity_in_world);
+  const auto down = world.size() == 1 ? ParseVector3(world[0].fields) : std::nullopt;
+  if (!down || !(down->norm() > 0.0)) {
+    return Failure{kExitUsage,
+                   "--gravity-in-world " + options.gravity_in_world + ": want a direction, X,Y,Z"};
+  }
+  gravity.down_in_world = *down;
+  const Result<std::string> text = ReadFile(options.gravity);
+  if (!text) return FailureFrom(text.error());
+  std::map<int64_t, Eigen::Vector3d> measured;
+  for (const DataLine& line : DataLines(*text)) {
+    const auto timestamp = ParseTimestamp(line.fields[0]);
+    const auto v = ParseVector3(std::span(line.fields).subspan(1));
+    if (!timestamp || !v || !(v->norm() > 0.0)) {
+      return Failure{kExitBadData,
+                     Place(options.gravity, line) + ": want \"timestamp x y z\", not all zero"};
+    }
+    measured[*timestamp] = *v;
+  }
+  for (size_t i = 0; i < run->frames.size(); ++i) {
+    const int64_t time = run->frames[i].timestamp_ns;
+    const auto near = measured.lower_bound(time - kSameFrameNs);
+    if (near == measured.end() || near->first > time + kSameFrameNs) {
+      return Failure{kExitBadData,
+                     options.gravity + ": has no line for frame " + FormatTimestamp(time)};
+    }
+    gravity.down_in_camera = near->second;
+    run->priors[i].gravity = gravity;
+  }
   return std::nullopt;
 }
 
@@ -131,22 +151,79 @@ Outcome ParsePoseSize(const std::string& option, const std::string& text, double
   return Failure{kExitUsage, option + " " + text + ": want two positive numbers, CM,DEG"};
 }
 
-void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
+Outcome ReadPriors(const std::string& path, const std::string& size,
+                   const std::vector<SequenceFrame>& frames, std::vector<PosePrior>* out_priors) {
+  double cm = 0.0, deg = 0.0;
+  if (Outcome failed = ParsePoseSize("--prior-size", size, &cm, &deg)) return failed;
+  PosePrior prior;
+  prior.position_sigma_m = cm / 100.0;
+  prior.rotation_sigma_rad = deg * std::numbers::pi / 180.0;
+  const Result<Trajectory> poses = ReadTumTrajectory(path);
+  if (!poses) return FailureFrom(poses.error());
+  size_t num_missing = 0;
+  int64_t first_missing_ns = 0;
+  for (const SequenceFrame& frame : frames) {
+    const StampedPose* pose = NearestPose(*poses, frame.timestamp_ns, kSameFrameNs);
+    if (pose == nullptr) {
+      if (num_missing++ == 0) first_missing_ns = frame.timestamp_ns;
+      continue;
+    }
+    prior.cam_from_world = pose->cam_from_world;
+    out_priors->push_back(prior);
+  }
+  if (num_missing == frames.size()) {
+    return Failure{kExitBadData, path + ": names none of the " + std::to_string(num_missing) +
+                                     " query frames"};
+  }
+  if (num_missing > 0) {
+    return Failure{kExitBadData, path + ": no pose for " + std::to_string(num_missing) +
+                                     " of the " + std::to_string(frames.size()) +
+                                     " frames, the first is " + FormatTimestamp(first_missing_ns)};
+  }
+  return std::nullopt;
+}
+
+void BindRecordingOptions(CLI::App& command, FrameRunOptions& options) {
   command
       .add_option("--sequence", options.sequence, "Sequence in TUM RGB-D layout with camera.json")
       ->required();
   command.add_option("--frames", options.frames, "File with the timestamps of the query frames")
       ->required();
-  command
-      .add_option("--priors", options.priors,
-                  "Coarse pose of every query frame, TUM format (camera-to-world)")
-      ->required();
   command.add_option("--map", options.map, "Directory that `plumbline map build` wrote")
       ->required();
   BindDetectorOptions(command, options.detector);
   command
+      .add_option(
+          "--points", options.points,
+          "none, or opencv: also SIFT points, matched with those that the map's key frames hold; "
+          "points alone with --model none")
+      ->check(CLI::IsMember({"none", "opencv"}))
+      ->capture_default_str();
+}
+
+void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
+  BindRecordingOptions(command, options);
+  command
+      .add_option("--priors", options.priors,
+                  "Coarse pose of every query frame, TUM format (camera-to-world)")
+      ->required();
+  command
       .add_option("--prior-size", options.prior_size,
                   "How far off the priors may be: norms in centimetres and degrees, CM,DEG")
+      ->capture_default_str();
+  command
+      .add_option("--gravity", options.gravity,
+                  "Gravity of an inertial sensor, a line \"timestamp x y z\" per query frame: the "
+                  "direction down in the camera (x right, y down, z forward), of any length")
+      ->check(CLI::ExistingFile);
+  CLI::Option* in_world = command.add_option("--gravity-in-world", options.gravity_in_world,
+                                             "The direction down in the map's world, X,Y,Z");
+  in_world->needs("--gravity");
+  command.get_option("--gravity")->needs(in_world);
+  command
+      .add_option("--gravity-sigma", options.gravity_sigma_deg,
+                  "Standard deviation of either angle of tilt, degrees")
+      ->check(CLI::Range(1e-3, 57.0))
       ->capture_default_str();
   command
       .add_option("--mode", options.mode,
@@ -156,13 +233,6 @@ void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
       ->capture_default_str();
   command.add_option("--method", options.method, "search, or the paper's local method")
       ->check(CLI::IsMember({"search", "paper"}))
-      ->capture_default_str();
-  command
-      .add_option(
-          "--points", options.points,
-          "none, or opencv: also SIFT points, matched with those that the map's key frames hold; "
-          "points alone with --model none")
-      ->check(CLI::IsMember({"none", "opencv"}))
       ->capture_default_str();
 }
 
@@ -180,7 +250,15 @@ Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
             [](const SequenceFrame& a, const SequenceFrame& b) {
               return a.timestamp_ns < b.timestamp_ns;
             });
-  if (Outcome failed = ReadPriors(options, out_run)) return failed;
+  if (!options.priors.empty()) {
+    if (Outcome failed =
+            ReadPriors(options.priors, options.prior_size, out_run->frames, &out_run->priors)) {
+      return failed;
+    }
+  }
+  if (!options.gravity.empty()) {
+    if (Outcome failed = ReadGravity(options, out_run)) return failed;
+  }
 
   Result<LineMap> map = ReadMap(options.map);
   if (!map) return FailureFrom(map.error());
@@ -221,11 +299,13 @@ Outcome RunFrames(FrameRun* run, const FrameSink& sink) {
     if (!image) return FailureFrom(image.error());
     std::vector<PointMatch> points;
     if (run->with_points) {
-      Result<std::vector<PointMatch>> matches =
-          point_front_end.QueryMatches(*image, run->sequence.rectifier, *run->index,
-                                       run->priors[i].cam_from_world, run->session.refiner.method);
-      if (!matches) return FailFrame(frame, matches.error());
-      points = *std::move(matches);
+      if (const Status found = point_front_end.ExtractQuery(*image, run->sequence.rectifier);
+          !found) {
+        return FailFrame(frame, found.error());
+      }
+      points = point_front_end.MatchQuery(run->sequence.camera, *run->index,
+                                          run->priors[i].cam_from_world,
+                                          run->session.refiner.method);
     }
     SessionFrame input;
     input.image = ViewOf(*image);

@@ -23,12 +23,17 @@ struct FrameRunOptions {
   std::string sequence, frames, priors, map;
   DetectorOptions detector;
   std::string prior_size = "10,2";  // cm, deg
+  std::string gravity, gravity_in_world;  // a file, X,Y,Z; empty: not known
+  double gravity_sigma_deg = 1.0;
   std::string mode;                 // independent | stream
   std::string method = "search";    // search | paper
   std::string points = "none";      // none | opencv
 };
 
-/// Declares the options; `options.mode` is the default mode.
+/// Declares --sequence, --frames, --map, --points and the detector's options.
+void BindRecordingOptions(CLI::App& command, FrameRunOptions& options);
+
+/// Declares all of them; `options.mode` is the default mode.
 void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options);
 
 /// The input of a run, read and checked completely before the first frame.
@@ -49,7 +54,13 @@ struct FrameRun {
 Outcome ParsePoseSize(const std::string& option, const std::string& text, double* out_cm,
                       double* out_deg);
 
-/// Reads everything that `options` name. Every frame needs an image and a prior.
+/// The prior of every frame, in the frames' order.
+/// @param size  CM,DEG.
+Outcome ReadPriors(const std::string& path, const std::string& size,
+                   const std::vector<SequenceFrame>& frames, std::vector<PosePrior>* out_priors);
+
+/// Reads everything that `options` name. Every frame needs an image, and a prior if priors are
+/// named.
 Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run);
 
 /// Gets frame number `index` of the run with its result, in order.

@@ -45,14 +45,16 @@ Result<std::vector<MapPoint>> PointFrontEnd::KeyFramePoints(const cv::Mat& image
   return LiftPoints(points_, rectifier, cam_from_world, depth);
 }
 
-Result<std::vector<PointMatch>> PointFrontEnd::QueryMatches(const cv::Mat& image,
-                                                            const Rectifier& rectifier,
-                                                            const MapIndex& index,
-                                                            const Rigid3& prior_cam_from_world,
-                                                            RefineMethod method) {
-  if (const Status extracted = Extract(image); !extracted) return extracted.error();
+Status PointFrontEnd::ExtractQuery(const cv::Mat& image, const Rectifier& rectifier) {
+  if (const Status extracted = Extract(image); !extracted) return extracted;
   image_pixels_ = points_.pixels;
   if (!rectifier.IsIdentity()) RectifyPixels(rectifier, &points_, &image_pixels_);
+  return Ok();
+}
+
+std::vector<PointMatch> PointFrontEnd::MatchQuery(const Camera& ideal, const MapIndex& index,
+                                                  const Rigid3& prior_cam_from_world,
+                                                  RefineMethod method) {
   matcher_.Match(points_, index, prior_cam_from_world, &correspondences_);
   std::vector<PointMatch> matches;
   const auto add = [&](const PointCorrespondence& c) {
@@ -61,8 +63,7 @@ Result<std::vector<PointMatch>> PointFrontEnd::QueryMatches(const cv::Mat& image
   };
   if (method == RefineMethod::kSearch) {
     for (const PointCorrespondence& c : correspondences_) add(c);
-  } else if (const std::optional<PointPose> pose =
-                 EstimatePointPose(rectifier.ideal(), correspondences_)) {
+  } else if (const std::optional<PointPose> pose = EstimatePointPose(ideal, correspondences_)) {
     for (const uint32_t inlier : pose->inliers) add(correspondences_[inlier]);
   }
   return matches;

@@ -24,13 +24,14 @@ class PointFrontEnd {
                                                const Rigid3& cam_from_world,
                                                const DepthView& depth);
 
-  /// 2D-3D matches of a query image with the key frames near its prior: all of them for the search,
-  /// which drops those that do not fit the lines' pose, else the inliers of PnP-RANSAC. Pixels are
-  /// those of the image.
-  Result<std::vector<PointMatch>> QueryMatches(const cv::Mat& image, const Rectifier& rectifier,
-                                               const MapIndex& index,
-                                               const Rigid3& prior_cam_from_world,
-                                               RefineMethod method);
+  /// Finds the points of a query image, for any number of MatchQuery().
+  Status ExtractQuery(const cv::Mat& image, const Rectifier& rectifier);
+
+  /// 2D-3D matches of the query image with the key frames near its prior: all of them for the
+  /// search, which drops those that do not fit the lines' pose, else the inliers of PnP-RANSAC.
+  /// Pixels are those of the image.
+  std::vector<PointMatch> MatchQuery(const Camera& ideal, const MapIndex& index,
+                                     const Rigid3& prior_cam_from_world, RefineMethod method);
 
  private:
   Status Extract(const cv::Mat& image);

@@ -32,6 +32,7 @@ void AddCommands(CLI::App& program, PendingRun& pending) {
   AddMapExport(map, pending);
   AddReplay(program, pending);
   CLI::App& eval = AddGroup(program, "eval", "Score detections or refined poses");
+  AddEvalAblation(eval, pending);
   AddEvalControls(eval, pending);
   AddEvalLines(eval, pending);
   AddEvalRepeatability(eval, pending);

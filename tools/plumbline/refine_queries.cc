@@ -69,11 +69,13 @@ Outcome ReadQueries(FrameRun* run, const std::string& segments_path, size_t limi
         query.segments = refiner.Refine(ViewOf(*image), *found, &run->sequence.rectifier);
       }
       if (run->with_points) {
-        Result<std::vector<PointMatch>> matches =
-            points.QueryMatches(*image, run->sequence.rectifier, *run->index,
-                                query.prior.cam_from_world, run->session.refiner.method);
-        if (!matches) return FailureFrom(matches.error());
-        query.points = *std::move(matches);
+        if (const Status extracted = points.ExtractQuery(*image, run->sequence.rectifier);
+            !extracted) {
+          return FailureFrom(extracted.error());
+        }
+        query.points =
+            points.MatchQuery(run->sequence.camera, *run->index, query.prior.cam_from_world,
+                              run->session.refiner.method);
         RectifyPoints(run->sequence.rectifier, &query.points);
       }
     }

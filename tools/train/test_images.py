@@ -22,6 +22,15 @@ def without(*packages):
     return mock.patch.object(builtins, "__import__", refuse)
 
 
+def another_decoder():
+    """Whether something else than OpenCV decodes images here."""
+    try:
+        with mock.patch.object(images, "cv2", None):
+            return images.decoder()[0]
+    except OSError:
+        return None
+
+
 class Images(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -34,9 +43,9 @@ class Images(unittest.TestCase):
         np.testing.assert_array_equal(images.read_rgb(self.path), self.image)
 
     def test_pillow_gives_the_same(self):
+        if another_decoder() != "PIL":
+            self.skipTest("Pillow is not installed")
         with mock.patch.object(images, "cv2", None):
-            if images.decoder()[0] != "PIL":
-                self.skipTest("Pillow is not installed")
             np.testing.assert_array_equal(images.read_rgb(self.path), self.image)
 
     def test_machine_without_a_decoder_is_told_so(self):
@@ -47,7 +56,7 @@ class Images(unittest.TestCase):
     def test_unreadable_file_is_named(self):
         with open(self.path, "wb") as f:
             f.write(b"no image")
-        for package in (images.cv2, None):
+        for package in (images.cv2, None) if another_decoder() else (images.cv2,):
             with mock.patch.object(images, "cv2", package), self.assertRaisesRegex(OSError, "cannot read image .*a.png"):
                 images.read_rgb(self.path)
 

@@ -105,6 +105,14 @@ Result<PosePrior> PriorFromAbi(const plumb_frame& frame) {
       return Invalid("frame.prior_uncertainty " + std::to_string(frame.prior_uncertainty) +
                      " is not a PLUMB_UNCERTAINTY");
   }
+  const Eigen::Map<const Eigen::Vector3d> down(frame.gravity_in_camera);
+  if (!down.isZero(0.0)) {
+    GravityPrior& gravity = prior.gravity.emplace();
+    gravity.down_in_camera = down;
+    if (IsGl(frame.pose_convention)) gravity.down_in_camera = GlFromCv() * gravity.down_in_camera;
+    gravity.down_in_world = Eigen::Map<const Eigen::Vector3d>(frame.gravity_in_world);
+    if (frame.gravity_sigma_rad != 0.0) gravity.sigma_rad = frame.gravity_sigma_rad;
+  }
   return prior;
 }
 

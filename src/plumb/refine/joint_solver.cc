@@ -130,6 +130,12 @@ std::optional<JointSolution> SolvePaperCost(const Camera& camera, const Rigid3& 
   PoseProblem problem(start);
   int num_lines = 0, num_points = 0;
   for (const PaperLine& line : lines) {
+    if (options.paper_residual == LineResidual::kPerpendicular) {
+      num_lines += problem.Add(
+          OverlapDistanceCost::Create(camera, line.line_in_world, line.segment_px, 1.0),
+          new ceres::HuberLoss(options.huber_px), alpha);
+      continue;
+    }
     // A line whose midpoint has no image contributes no angle either.
     if (!problem.Add(MidpointDistanceCost::Create(camera, line.line_in_world, line.segment_px, 1.0),
                      new ceres::HuberLoss(options.huber_px), alpha)) {

@@ -7,6 +7,7 @@
 #include "plumb/geometry/camera.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
+#include "plumb/refine/line_residual.h"
 #include "plumb/refine/normal_equations.h"
 
 namespace plumb {
@@ -20,6 +21,7 @@ struct PaperLine {
 
 struct JointSolverOptions {
   double huber_px = 2.0;  // of the paper's cost, > 0
+  LineResidual paper_residual = LineResidual::kMidpointAngle;  // of the paper's cost
   /// Scales of the overlap cost's Geman-McClure loss, in deviations of a residual, > 0.
   double line_robust = 1.0, point_robust = 3.0;
   int max_iterations = 25;  // >= 1
@@ -36,8 +38,9 @@ struct JointSolution {
 ///
 ///   alpha sum_i (|d_i| + |theta_i|) + beta sum_j |e_j|,  alpha = M / (N + M), beta = N / (N + M)
 ///
-/// for N lines and M points; eq. 5 (alpha = 1) without points. Matches that have no image at
-/// `start` are left out.
+/// for N lines and M points; eq. 5 (alpha = 1) without points. With kPerpendicular, the norm of the
+/// distances of both ends of the segment stands for |d_i| + |theta_i|. Matches that have no image
+/// at `start` are left out.
 /// @return nullopt when an input is not finite, nothing is left, or the solver has no usable
 ///         solution. Convergence does not mean that the pose is observed: see Observe().
 std::optional<JointSolution> SolvePaperCost(const Camera& camera, const Rigid3& start,

@@ -153,7 +153,14 @@ Matrix6d PosePriorFactor::Information() const {
   Vector6d diagonal;
   diagonal << Eigen::Vector3d::Constant(1.0 / (rotation_sigma_rad * rotation_sigma_rad)),
       Eigen::Vector3d::Constant(1.0 / (position_sigma_m * position_sigma_m));
-  return diagonal.asDiagonal();
+  Matrix6d information = diagonal.asDiagonal();
+  if (tilt) {
+    const Eigen::Matrix3d about = tilt->axis_in_camera * tilt->axis_in_camera.transpose();
+    information.topLeftCorner<3, 3>() =
+        (Eigen::Matrix3d::Identity() - about) / (tilt->sigma_rad * tilt->sigma_rad) +
+        diagonal[0] * about;
+  }
+  return information;
 }
 
 NormalEquations PriorEquations(const PosePriorFactor& prior, const Rigid3& cam_from_world) {

@@ -92,11 +92,18 @@ class PointAccumulator {
   std::vector<double> squares_;
 };
 
+/// A rotation that is known better across an axis than about it.
+struct TiltPrior {
+  Eigen::Vector3d axis_in_camera = Eigen::Vector3d::UnitY();  // unit
+  double sigma_rad = 1.0;                                     // of each component across the axis
+};
+
 /// Gaussian prior on the pose.
 struct PosePriorFactor {
   Rigid3 cam_from_world;
   double rotation_sigma_rad = 1.0;  // per component of the weight: information 1 / sigma^2
   double position_sigma_m = 10.0;
+  std::optional<TiltPrior> tilt = std::nullopt;  // then rotation_sigma_rad is about its axis only
 
   Matrix6d Information() const;
 };

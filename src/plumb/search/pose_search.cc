@@ -114,7 +114,10 @@ std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const Search
 void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const SearchLine> lines,
                                 const PoseSearchOptions& options, uint64_t seed) {
   Random random(seed);
-  const float rotation_sigma = static_cast<float>(region.rotation_sigma_rad / std::sqrt(3.0));
+  const RotationSpread spread{
+      .sigma_rad = static_cast<float>(region.rotation_sigma_rad / std::sqrt(3.0)),
+      .axis = region.down_in_camera,
+      .tilt_sigma_rad = static_cast<float>(region.tilt_sigma_rad)};
   const float position_sigma = static_cast<float>(region.position_sigma_m / std::sqrt(3.0));
   hypotheses_.clear();
   // A camera centre moved by c (in the prior's camera frame) is the translation -R c.
@@ -126,7 +129,7 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
   add(Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero());
   const uint32_t num_drawn = (options.num_hypotheses + 1) / 2;
   for (uint32_t k = 1; k < num_drawn; ++k) {
-    const Eigen::Matrix3f rotation = RotationFromVector(random.Normal3(rotation_sigma));
+    const Eigen::Matrix3f rotation = RotationFromVector(Draw(spread, &random));
     add(rotation, random.Normal3(position_sigma));
   }
   if (options.num_hypotheses <= num_drawn) return;
@@ -140,7 +143,7 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
   clusterer_.Cluster(lines_in_prior_, kMaxClusters, &clusters_);
   rotation_search_.Search(
       camera_, std::span(segments_).first(std::min(segments_.size(), kRotationSegments)), clusters_,
-      {.num_draws = options.num_hypotheses, .rotation_sigma_rad = region.rotation_sigma_rad},
+      {.num_draws = options.num_hypotheses, .spread = spread},
       &random, &rotations_);
   for (uint32_t k = num_drawn; k < options.num_hypotheses; ++k) {
     const Eigen::Matrix3f& found =

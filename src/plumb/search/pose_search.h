@@ -25,6 +25,10 @@ struct SearchRegion {
   Rigid3 cam_from_world;
   double rotation_sigma_rad = 0.035;
   double position_sigma_m = 0.10;
+  /// Where gravity is known: unit, and the standard deviation of either angle of tilt against it;
+  /// rotation_sigma_rad / sqrt(3) is then that of the turn about it. Zero: not known.
+  Eigen::Vector3f down_in_camera = Eigen::Vector3f::Zero();
+  double tilt_sigma_rad = 0.0;
 };
 
 struct PoseSearchOptions {

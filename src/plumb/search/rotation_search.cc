@@ -59,6 +59,13 @@ Eigen::Matrix3f RotationFromVector(const Eigen::Vector3f& w) {
       .toRotationMatrix();
 }
 
+Eigen::Vector3f Draw(const RotationSpread& spread, Random* random) {
+  const Eigen::Vector3f w = random->Normal3(spread.sigma_rad);
+  if (spread.axis.isZero()) return w;
+  const Eigen::Vector3f about = w.dot(spread.axis) * spread.axis;
+  return about + spread.tilt_sigma_rad / spread.sigma_rad * (w - about);
+}
+
 float RotationSearch::Score(const Eigen::Matrix3f& rotation,
                             std::span<const DirectionCluster> clusters) {
   static const float kInverseSquareWidth =
@@ -95,11 +102,10 @@ void RotationSearch::Search(const Camera& camera, std::span<const Segment2> segm
     }
   }
 
-  const float sigma = static_cast<float>(options.rotation_sigma_rad / std::sqrt(3.0));
   draws_.clear();
   order_.clear();
   for (uint32_t k = 0; k < options.num_draws; ++k) {
-    const Eigen::Vector3f w = random->Normal3(sigma);
+    const Eigen::Vector3f w = plumb::Draw(options.spread, random);
     Draw draw;
     draw.rotation = RotationFromVector(k == 0 ? Eigen::Vector3f(Eigen::Vector3f::Zero()) : w);
     draw.score = Score(draw.rotation, clusters);

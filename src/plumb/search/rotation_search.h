@@ -14,10 +14,19 @@
 
 namespace plumb {
 
+/// Gaussian of rotation vectors.
+struct RotationSpread {
+  float sigma_rad = 0.02f;  // per component
+  /// Unit: the components across it have `tilt_sigma_rad` instead. Zero: none.
+  Eigen::Vector3f axis = Eigen::Vector3f::Zero();
+  float tilt_sigma_rad = 0.0f;
+};
+Eigen::Vector3f Draw(const RotationSpread& spread, Random* random);
+
 struct RotationSearchOptions {
   uint32_t num_draws = 1500;
   size_t num_kept = 24;
-  double rotation_sigma_rad = 0.035;  // norm
+  RotationSpread spread;
 };
 
 /// Draws rotations around the identity and keeps the best by

@@ -64,7 +64,9 @@ RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options) {
   if (!(evidence.refined.Value() >= options.min_gain * evidence.prior.Value())) {
     return RefineStatus::kKeptPrior;
   }
-  if (evidence.runner_up_ratio > kMaxRunnerUpRatio || !evidence.is_near_prior) {
+  const double max_ratio =
+      evidence.evidence_nats < kWeakNats ? kWeakRunnerUpRatio : kMaxRunnerUpRatio;
+  if (evidence.runner_up_ratio > max_ratio || !evidence.is_near_prior) {
     return RefineStatus::kAmbiguous;
   }
   return RefineStatus::kRefined;

@@ -18,6 +18,12 @@ struct GateEvidence {
   int num_observed_directions = 0;  // of 6
 };
 
+/// Below so much evidence a pose is weak: a rival needs only this share of its support to make it
+/// ambiguous, and it is worth looking for one farther off than the prior says. Weak poses
+/// that were right had rivals of 0.77 at most, a staircase one step off has one of 0.86 and more
+/// (docs/adr/0008).
+inline constexpr double kWeakNats = 15.0, kWeakRunnerUpRatio = 0.85;
+
 struct GateOptions {
   double min_map_support = 0.05;
   /// EvidenceToBeat() of the poses that were tried.

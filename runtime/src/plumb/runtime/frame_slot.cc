@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "plumb/runtime/rectify_points.h"
+#include "plumb/runtime/refine_input_check.h"
 #include "plumb/runtime/session.h"
 
 namespace plumb {
@@ -91,6 +92,9 @@ Status ValidateFrame(const SessionFrame& frame) {
   if (!is_positive(frame.prior.rotation_sigma_rad)) {
     return invalid("prior.rotation_sigma_rad " + std::to_string(frame.prior.rotation_sigma_rad) +
                    " is not positive");
+  }
+  if (frame.prior.gravity) {
+    if (const Status valid = CheckGravity(*frame.prior.gravity); !valid) return valid;
   }
   for (size_t i = 0; i < frame.points.size(); ++i) {
     const PointMatch& point = frame.points[i];

@@ -8,14 +8,13 @@
 #include "plumb/refine/uncertainty.h"
 #include "plumb/runtime/acceptance_gate.h"
 #include "plumb/runtime/covariance_factor.h"
+#include "plumb/runtime/gravity.h"
 
 namespace plumb {
 namespace {
 
 constexpr uint32_t kNumKeyFrames = 5;
 constexpr double kMinOverlap = 0.25;
-constexpr int kMaxRematches = 3;
-constexpr size_t kMinMatches = 4;
 constexpr double kMinVisiblePx = 10.0;
 constexpr double kMinGain = 1.03;
 constexpr double kVariancePx2 = 0.7 * 0.7;
@@ -60,28 +59,6 @@ void PaperMethod::CollectCandidates(const RefineInput& input) {
   candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
 }
 
-void PaperMethod::Solve(const RefineInput& input, Rigid3* cam_from_world) {
-  points_.clear();
-  for (const PointMatch& match : input.points) {
-    points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
-  }
-  assignments_.clear();
-  for (int rematch = 0; rematch < kMaxRematches; ++rematch) {
-    AssignOneToOne(input.camera, *cam_from_world, segments_.segments, lines_, candidates_,
-                   ReprojectionGates{}, &assignments_);
-    if (assignments_.size() < kMinMatches) return;
-    paper_lines_.clear();
-    for (const LineAssignment& match : assignments_) {
-      paper_lines_.push_back(
-          {lines_[match.line], segments_.segments[match.segment], match.projected_length_px});
-    }
-    const auto solution =
-        SolvePaperCost(input.camera, *cam_from_world, paper_lines_, points_, JointSolverOptions{});
-    if (!solution) return;
-    *cam_from_world = solution->cam_from_world;
-  }
-}
-
 PoseSupport PaperMethod::MeasureSupport(const Camera& camera, const Rigid3& cam_from_world) {
   ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
   return support_meter_.Measure(projected_, segments_.table);
@@ -94,18 +71,22 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
   selector_.SelectForSearch(input.camera, prior, input.prior.rotation_sigma_rad, &search_lines_);
   CollectCandidates(input);
   Rigid3 refined = prior;
-  Solve(input, &refined);
+  points_.clear();
+  for (const PointMatch& match : input.points) {
+    points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
+  }
+  solver_.Solve(input.camera, segments_.segments, lines_, candidates_, points_,
+                options_.residual.value_or(LineResidual::kMidpointAngle), &refined);
 
   observations_.clear();
-  for (const LineAssignment& match : assignments_) {
+  for (const LineAssignment& match : solver_.assignments()) {
     observations_.push_back({.line_in_world = lines_[match.line],
                              .part_px = segments_.segments[match.segment],
                              .weight = 1.0,
                              .variance_px2 = kVariancePx2});
   }
   const LineEquations terms = AccumulateLines(input.camera, refined, observations_, kRobust);
-  const Matrix6d prior_information =
-      PriorCovariance(input.prior.rotation_sigma_rad, input.prior.position_sigma_m).inverse();
+  const Matrix6d prior_information = CovarianceOf(input.prior).inverse();
   const PoseSupport prior_support = MeasureSupport(input.camera, prior);
   const GateEvidence evidence{
       .refined = MeasureSupport(input.camera, refined),  // last: projects for the evidence
@@ -127,7 +108,7 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
                                         prior_information);
     result->num_points_used = static_cast<uint32_t>(points_.size());
   }
-  for (const LineAssignment& match : assignments_) {
+  for (const LineAssignment& match : solver_.assignments()) {
     const Segment2& segment = segments_.segments[match.segment];
     const Segment3& line = lines_[match.line];
     const auto image = ProjectLine(

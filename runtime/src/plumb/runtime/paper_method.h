@@ -9,10 +9,10 @@
 #include "plumb/matching/epipolar_matcher.h"
 #include "plumb/matching/match_evidence.h"
 #include "plumb/matching/support.h"
-#include "plumb/refine/joint_solver.h"
 #include "plumb/refine/normal_equations.h"
 #include "plumb/runtime/fine_alignment.h"
 #include "plumb/runtime/line_selection.h"
+#include "plumb/runtime/one_to_one_solver.h"
 #include "plumb/runtime/pose_refiner.h"
 
 namespace plumb {
@@ -34,7 +34,6 @@ class PaperMethod {
   };
 
   void CollectCandidates(const RefineInput& input);
-  void Solve(const RefineInput& input, Rigid3* cam_from_world);
   PoseSupport MeasureSupport(const Camera& camera, const Rigid3& cam_from_world);
 
   const MapIndex& index_;
@@ -50,8 +49,7 @@ class PaperMethod {
   std::vector<uint32_t> factor_key_frames_;
   std::vector<uint32_t> key_frames_;
   std::vector<MatchCandidate> candidates_;
-  std::vector<LineAssignment> assignments_;
-  std::vector<PaperLine> paper_lines_;
+  OneToOneSolver solver_;
   std::vector<PointObservation> points_;
   std::vector<LineObservation> observations_;
 };

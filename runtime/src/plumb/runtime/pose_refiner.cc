@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "plumb/refine/uncertainty.h"
+#include "plumb/runtime/gravity.h"
 #include "plumb/runtime/paper_method.h"
 #include "plumb/runtime/refine_input_check.h"
 #include "plumb/runtime/search_method.h"
@@ -75,10 +76,12 @@ Status PoseRefiner::Refine(const RefineInput& input, RefineResult* out_result) {
   out_result->cam_from_world = input.prior.cam_from_world;
   out_result->covariance =
       PriorCovariance(input.prior.rotation_sigma_rad, input.prior.position_sigma_m);
+  RefineInput fused = input;
+  fused.prior = FuseGravity(input.prior);
   if (impl_->search) {
-    impl_->search->Refine(input, out_result);
+    impl_->search->Refine(fused, out_result);
   } else {
-    impl_->paper->Refine(input, out_result);
+    impl_->paper->Refine(fused, out_result);
   }
   out_result->total_ns =
       std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - start)

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
 #include "plumb/map/map_index.h"
+#include "plumb/refine/line_residual.h"
 
 namespace plumb {
 
@@ -28,12 +30,23 @@ enum class RefineStatus {
 };
 std::string_view ToString(RefineStatus status);  // "REFINED", "KEPT_PRIOR", ...
 
+/// Gravity as an inertial sensor at rest measures it: it tells tilt, not heading.
+struct GravityPrior {
+  /// Directions of any length > 0. "Down" may as well be "up" if it is so in both.
+  Eigen::Vector3d down_in_camera = Eigen::Vector3d::UnitY();
+  Eigen::Vector3d down_in_world = Eigen::Vector3d::UnitY();
+  double sigma_rad = 0.0175;  // standard deviation of each of the two angles of tilt, (0, 1]
+};
+
 /// A coarse pose and how far off it may be.
 struct PosePrior {
   Rigid3 cam_from_world;
   /// Norms of the uncertainty (one standard deviation of the whole vector, not per component).
   double position_sigma_m = 0.10;
   double rotation_sigma_rad = 0.0349;
+  /// Makes the tilt more certain than the rest of the rotation. Ignored where it contradicts
+  /// `cam_from_world` by more than 5 deviations.
+  std::optional<GravityPrior> gravity = std::nullopt;
 };
 
 /// A 2D-3D point correspondence, from the host or from points/.
@@ -49,6 +62,9 @@ enum class RefineMethod { kSearch, kPaper };
 
 struct PoseRefinerOptions {
   RefineMethod method = RefineMethod::kSearch;
+  /// The last word on the pose. Absent: the method's own, kPerpendicular of kSearch and
+  /// kMidpointAngle of kPaper; the other one is for comparisons (`plumbline eval ablation`).
+  std::optional<LineResidual> residual = std::nullopt;
   uint32_t num_hypotheses = 1500;  // of the search, 1..2048
   /// Smallest share of the visible map's length that the segments must explain, in (0, 1). Chance
   /// is judged by the evidence; this only refuses poses that are right and of no use.

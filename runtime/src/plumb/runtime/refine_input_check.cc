@@ -10,6 +10,7 @@ namespace {
 
 // A prior this uncertain is no prior; a tighter one would divide by zero.
 constexpr double kMaxPositionSigmaM = 1e3, kMaxRotationSigmaRad = 3.2, kMinSigma = 1e-9;
+constexpr double kMaxGravitySigmaRad = 1.0;
 constexpr double kUnitTolerance = 1e-3;
 // Coordinates beyond this are not pixels of any image [px].
 constexpr double kMaxPixel = 1e6;
@@ -62,10 +63,29 @@ Status CheckPrior(const PosePrior& prior) {
     return Invalid("prior rotation uncertainty " + std::to_string(prior.rotation_sigma_rad) +
                    " rad is not in (0, 3.2]");
   }
-  return Ok();
+  return prior.gravity ? CheckGravity(*prior.gravity) : Ok();
 }
 
 }  // namespace
+
+Status CheckGravity(const GravityPrior& gravity) {
+  const auto is_direction = [](const Eigen::Vector3d& v) {
+    return std::isfinite(v.squaredNorm()) && v.norm() > kMinSigma;
+  };
+  if (!is_direction(gravity.down_in_camera)) {
+    return Invalid("prior gravity in the camera " + Text(gravity.down_in_camera) +
+                   " is not a direction");
+  }
+  if (!is_direction(gravity.down_in_world)) {
+    return Invalid("prior gravity in the world " + Text(gravity.down_in_world) +
+                   " is not a direction");
+  }
+  if (!(gravity.sigma_rad >= kMinSigma && gravity.sigma_rad <= kMaxGravitySigmaRad)) {
+    return Invalid("prior gravity uncertainty " + std::to_string(gravity.sigma_rad) +
+                   " rad is not in (0, 1]");
+  }
+  return Ok();
+}
 
 Status CheckRefineInput(const RefineInput& input) {
   if (Status status = CheckCamera(input.camera); !status) return status;

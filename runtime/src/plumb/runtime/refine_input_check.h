@@ -9,4 +9,7 @@ namespace plumb {
 /// @return kInvalidArgument with one sentence that names the value and, in lists, its position.
 Status CheckRefineInput(const RefineInput& input);
 
+/// The part of it that a prior's gravity takes.
+Status CheckGravity(const GravityPrior& gravity);
+
 }  // namespace plumb

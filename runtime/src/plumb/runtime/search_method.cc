@@ -6,6 +6,7 @@
 #include "plumb/base/stopwatch.h"
 #include "plumb/refine/uncertainty.h"
 #include "plumb/runtime/covariance_factor.h"
+#include "plumb/runtime/gravity.h"
 
 namespace plumb {
 namespace {
@@ -26,6 +27,8 @@ constexpr double kSearchGain = 1.03, kStreamGain = 1.0;
 // A second attempt looks twice as far. A prior that was found good needs none.
 constexpr double kWideningFactor = 2.0;
 constexpr uint32_t kMaxHypotheses = 2048;
+// How far rivals of a weak pose are looked for: repeated structure does not keep to the prior.
+constexpr double kRivalFactor = 3.0;
 
 constexpr size_t kMinLocalLines = 20;
 
@@ -59,15 +62,26 @@ bool IsSame(const Rigid3& a_from_world, const Rigid3& b_from_world) {
 }
 
 PosePriorFactor WeakFactor(const PosePrior& prior) {
-  return {prior.cam_from_world, kPriorFactorScale * prior.rotation_sigma_rad,
-          kPriorFactorScale * prior.position_sigma_m};
+  PosePriorFactor factor{prior.cam_from_world, kPriorFactorScale * prior.rotation_sigma_rad,
+                         kPriorFactorScale * prior.position_sigma_m};
+  if (prior.gravity) {
+    factor.tilt = TiltPrior{prior.gravity->down_in_camera,
+                            kPriorFactorScale * prior.gravity->sigma_rad};
+  }
+  return factor;
+}
+
+SearchRegion RegionOf(const PosePrior& prior) {
+  SearchRegion region{prior.cam_from_world, prior.rotation_sigma_rad, prior.position_sigma_m};
+  if (prior.gravity) {
+    region.down_in_camera = prior.gravity->down_in_camera.cast<float>();
+    region.tilt_sigma_rad = prior.gravity->sigma_rad;
+  }
+  return region;
 }
 
 Matrix6d PriorInformation(const PosePrior& prior) {
-  return PriorCovariance(prior.rotation_sigma_rad, prior.position_sigma_m)
-      .diagonal()
-      .cwiseInverse()
-      .asDiagonal();
+  return CovarianceOf(prior).inverse();
 }
 
 }  // namespace
@@ -103,6 +117,11 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
       prior = wide;
     }
   }
+  if (input.search && attempt.status == RefineStatus::kRefined &&
+      attempt.evidence.evidence_nats < kWeakNats && !HoldsByPoints(input) &&
+      !IsOutOfTime(kWideningShare) && HasRival(input, prior, attempt, &search_ns)) {
+    attempt.status = RefineStatus::kAmbiguous;
+  }
   result->map_support = attempt.evidence.refined.map_share;
   result->evidence_nats = attempt.evidence.evidence_nats;
   result->runner_up_ratio = attempt.evidence.runner_up_ratio;
@@ -127,9 +146,13 @@ void SearchMethod::Finish(const RefineInput& input, const PosePrior& prior, Fine
                           RefineResult* result) {
   Stopwatch watch;
   local_lines_.clear();
-  if (!IsOutOfTime(kLastStepsShare)) FinishOnLocalLines(input, WeakFactor(prior), &alignment);
-  stages_.local_ns = watch.Lap();
-  if (!IsOutOfTime()) FinishWithPoints(input, WeakFactor(prior), &alignment);
+  if (options_.residual == LineResidual::kMidpointAngle) {
+    FinishOneToOne(input, &alignment);
+  } else {
+    if (!IsOutOfTime(kLastStepsShare)) FinishOnLocalLines(input, WeakFactor(prior), &alignment);
+    stages_.local_ns = watch.Lap();
+    if (!IsOutOfTime()) FinishWithPoints(input, WeakFactor(prior), &alignment);
+  }
   stages_.joint_ns = watch.Lap();
   // Both families in units of the lines' own residuals, which the covariance divides out again.
   const Matrix6d information =
@@ -162,6 +185,22 @@ bool SearchMethod::HoldsByPoints(const RefineInput& input) const {
   return point_pose_.num_inliers >= kMinDecidingPoints &&
          2 * point_pose_.num_inliers >= all_points_.size() &&
          IsPlausible(point_pose_.cam_from_world, input.prior);
+}
+
+bool SearchMethod::HasRival(const RefineInput& input, const PosePrior& prior,
+                            const Attempt& attempt, int64_t* search_ns) {
+  PosePrior wide = prior;
+  wide.position_sigma_m *= kRivalFactor;
+  wide.rotation_sigma_rad *= kRivalFactor;
+  const Attempt second = Try(input, wide, kMaxHypotheses, kMaxHypotheses);
+  *search_ns += second.search_ns;
+  const Rigid3& pose = attempt.alignment.cam_from_world;
+  // On the lines that the wide prior sees, as the supports of the survivors.
+  const double needed = kWeakRunnerUpRatio * MeasureSupport(input.camera, pose).Value();
+  return std::any_of(survivors_.begin(), survivors_.end(), [&](const Survivor& survivor) {
+    return survivor.support.Value() > needed &&
+           IsClearlyDifferent(survivor.alignment.cam_from_world, pose);
+  });
 }
 
 bool SearchMethod::MayWiden(const Attempt& attempt, const Rigid3& prior) {
@@ -264,7 +303,7 @@ std::span<const FoundPose> SearchMethod::FindStarts(const RefineInput& input,
     lines_to_find_.push_back({line.segment_in_world, line.weight});
   }
   const std::span<const FoundPose> found = pose_search_.Search(
-      input.camera, {prior.cam_from_world, prior.rotation_sigma_rad, prior.position_sigma_m},
+      input.camera, RegionOf(prior),
       lines_to_find_, segments_.segments,
       {.num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors, .deadline = deadline_},
       MixSeeds(options_.seed, input.seed));
@@ -333,6 +372,24 @@ void SearchMethod::FinishWithPoints(const RefineInput& input, const PosePriorFac
   *alignment = aligner_.Run(alignment->cam_from_world, JointSchedule(), prior, &near_points_);
   alignment->cam_from_world =
       aligner_.Polish(*alignment, kLineRobust, kPolishSteps, prior, near_points_);
+}
+
+void SearchMethod::FinishOneToOne(const RefineInput& input, FineAlignment* alignment) {
+  const Rigid3& pose = alignment->cam_from_world;
+  near_observations_.clear();
+  point_terms_.FindNear(input.camera, pose, all_points_, kNearPointPx, &near_rows_);
+  for (const uint32_t row : near_rows_) near_observations_.push_back(observed_points_[row]);
+  SelectFineLines(input.camera, pose);
+  ProjectCandidates(input.camera, pose, fine_lines_, kMinVisiblePx, &projected_);
+  associator_.Associate(projected_, segments_.table, kMatchGates, &pairs_);
+  lines_to_match_.clear();
+  for (const CandidateLine& line : fine_lines_) lines_to_match_.push_back(line.segment_in_world);
+  match_candidates_.clear();
+  for (const LinePair& pair : pairs_) match_candidates_.push_back({pair.segment, pair.line});
+  std::sort(match_candidates_.begin(), match_candidates_.end());
+  one_to_one_solver_.Solve(input.camera, segments_.segments, lines_to_match_, match_candidates_,
+                           near_observations_, LineResidual::kMidpointAngle,
+                           &alignment->cam_from_world);
 }
 
 void SearchMethod::ReportMatches(const Camera& camera, const Rigid3& cam_from_world,

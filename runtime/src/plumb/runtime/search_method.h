@@ -17,6 +17,7 @@
 #include "plumb/runtime/expected_evidence.h"
 #include "plumb/runtime/fine_alignment.h"
 #include "plumb/runtime/line_selection.h"
+#include "plumb/runtime/one_to_one_solver.h"
 #include "plumb/runtime/point_solver.h"
 #include "plumb/runtime/pose_refiner.h"
 #include "plumb/search/pose_search.h"
@@ -51,6 +52,10 @@ class SearchMethod {
               uint32_t num_tried);
   /// Whether a search with a larger uncertainty can still help.
   static bool MayWiden(const Attempt& attempt, const Rigid3& prior);
+  /// Whether a pose far from an attempt's, farther than the prior says, explains the lines nearly
+  /// as well.
+  bool HasRival(const RefineInput& input, const PosePrior& prior, const Attempt& attempt,
+                int64_t* search_ns);
   /// Solves the pose from the points alone, if there are enough.
   void AcceptPoints(const RefineInput& input);
   bool HoldsByPoints(const RefineInput& input) const;
@@ -71,6 +76,8 @@ class SearchMethod {
                           FineAlignment* alignment);
   void FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
                         FineAlignment* alignment);
+  /// Instead of both: the paper's cost on one-to-one matches, from where the alignment ends.
+  void FinishOneToOne(const RefineInput& input, FineAlignment* alignment);
   void ReportMatches(const Camera& camera, const Rigid3& cam_from_world, RefineResult* result);
 
   const MapIndex& index_;
@@ -97,6 +104,10 @@ class SearchMethod {
   PointTableAccumulator point_terms_;
   std::vector<uint32_t> near_rows_;
   std::vector<uint32_t> key_frames_;
+  OneToOneSolver one_to_one_solver_;
+  std::vector<Segment3> lines_to_match_;  // of fine_lines_
+  std::vector<MatchCandidate> match_candidates_;
+  std::vector<PointObservation> near_observations_;
   SoftAssociator associator_;
   std::vector<LinePair> pairs_;
   std::vector<int32_t> best_pair_;  // per segment

@@ -19,6 +19,7 @@ Status StreamTracker::Track(const RefineInput& input, RefineResult* out_result) 
   if (local) {
     RefineInput local_input = input;
     local_input.prior = *local;
+    local_input.prior.gravity = input.prior.gravity;
     local_input.search = false;
     if (const Status status = refiner_->Refine(local_input, out_result); !status) return status;
     match_ns = out_result->match_and_refine_ns;

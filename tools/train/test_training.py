@@ -221,11 +221,13 @@ class Resume(unittest.TestCase):
                 for name, value in a[key].items():
                     self.assertTrue(torch.equal(value, b[key][name]), name)
 
-    def test_state_in_the_repository_can_be_continued(self):
-        run = train.Run(train.parse_arguments(["--data", "", "--out", "", "--device", "cpu"]), train.Team())
-        run.restore(os.path.join(HERE, "state", "nano.pt"))
-        self.assertGreater(run.images, 30000)
-        self.assertIsNone(run.decay_start)
+    def test_committed_networks_can_be_continued(self):
+        for preset in ("nano", "mobile"):
+            run = train.Run(train.parse_arguments(["--data", "", "--out", "", "--device", "cpu", "--preset", preset]), train.Team())
+            before = run.model.state_dict()["stem.conv.weight"].clone()
+            run.begin(os.path.join(HERE, "..", "..", "assets", "models", preset + ".safetensors"))
+            self.assertFalse(torch.equal(run.model.state_dict()["stem.conv.weight"], before))
+            self.assertEqual(run.images, 0)
 
     def test_decay_phase_leaves_the_long_run_untouched_and_ends(self):
         with tempfile.TemporaryDirectory() as folder:

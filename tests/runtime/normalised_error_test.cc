@@ -32,8 +32,9 @@ std::vector<Rigid3> Walk() {
 /// A room's map with the errors that it claims: fused lines are off by 2 mm across; key frames'
 /// segments by half a pixel at each end, and along the rays by a depth camera's noise. Calibrated
 /// as `map build` does.
-LineMap NoisyMap(const std::vector<Segment3>& lines, Random* random) {
-  LineMap map = testing::MapOf(lines, Walk(), kFusedNoiseM);
+LineMap NoisyMap(const std::vector<Segment3>& lines, const std::vector<Rigid3>& key_frames,
+                 Random* random) {
+  LineMap map = testing::MapOf(lines, key_frames, kFusedNoiseM);
   for (MapLine& line : map.lines) {
     const Eigen::Vector3d d = line.segment_in_world.Delta().normalized();
     for (Eigen::Vector3d* end : {&line.segment_in_world.start, &line.segment_in_world.end}) {
@@ -62,12 +63,15 @@ LineMap NoisyMap(const std::vector<Segment3>& lines, Random* random) {
   return map;
 }
 
-TEST(NormalisedError, IsWithinTwiceItsExpectation) {
+/// Squared errors over the covariances of 120 poses must be as large as those of a chi-square
+/// variable with 6 degrees of freedom, to a factor of 2.
+void ExpectHonest(const std::vector<Rigid3>& key_frames, bool is_calibrated) {
   const std::vector<Segment3> lines = testing::RoomLines();
   Random random(31);
   std::vector<double> squares;
   for (int m = 0; m < 10; ++m) {
-    const LineMap map = NoisyMap(lines, &random);
+    const LineMap map = NoisyMap(lines, key_frames, &random);
+    EXPECT_EQ(map.covariance_factor != kUncalibratedFactor, is_calibrated);
     const MapIndex index(map);
     const auto refiner = PoseRefiner::Create(index, {});
     ASSERT_TRUE(refiner.has_value());
@@ -93,11 +97,18 @@ TEST(NormalisedError, IsWithinTwiceItsExpectation) {
   for (const double square : squares) mean += square / static_cast<double>(squares.size());
   std::sort(squares.begin(), squares.end());
   const double median = squares[squares.size() / 2];
-  // Chi-square with 6 degrees of freedom has the mean 6 and the median 5.35.
+  // Their mean and median.
   EXPECT_GT(median, 0.5 * 5.35);
   EXPECT_LT(median, 2.0 * 5.35);
   EXPECT_GT(mean, 0.5 * 6.0);
   EXPECT_LT(mean, 2.0 * 6.0);
+}
+
+TEST(NormalisedError, IsWithinTwiceItsExpectation) { ExpectHonest(Walk(), true); }
+
+// A metre apart, key frames do not see each other's lines.
+TEST(NormalisedError, IsSoOnAMapTooSparseToBeCalibrated) {
+  ExpectHonest(testing::RoomKeyFrames(), false);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "plumb/map/line_map.h"
 #include "tests/tools/program_run.h"
 #include "tools/synth/sequence_writer.h"
 
@@ -112,7 +113,7 @@ TEST_F(Replay, CalibrationOnTooFewKeyFramesSaysSo) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("uncalibrated"));
   const json info = json::parse(RunPlumbline("map info " + (dir_ / "map") + " --json").out);
-  EXPECT_EQ(info["covariance_factor"].get<double>(), 1.0);
+  EXPECT_EQ(info["covariance_factor"].get<double>(), kUncalibratedFactor);
   EXPECT_EQ(info["points"], 0);
 }
 

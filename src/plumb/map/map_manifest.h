@@ -28,7 +28,7 @@ struct TileEntry {
 struct MapManifest {
   std::string detector;
   DepthSource depth_source = DepthSource::kSensor;
-  double covariance_factor = 1.0, covariance_growth = 0.0;
+  double covariance_factor = kUncalibratedFactor, covariance_growth = 0.0;
   std::optional<PoseChange> pose_change;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::array<TileEntry, kNumTileKinds> tiles;  // in the order of TileKind

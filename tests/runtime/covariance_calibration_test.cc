@@ -84,7 +84,7 @@ TEST(CovarianceCalibration, TooFewKeyFramesKeepTheMapsOwnValues) {
   EXPECT_EQ(calibration.num_errors, 0u);
   EXPECT_EQ(calibration.factor, 2.5);
   EXPECT_EQ(calibration.growth, 7.0);
-  EXPECT_EQ(CalibrateCovariance(LineMap{}).factor, 1.0);
+  EXPECT_EQ(CalibrateCovariance(LineMap{}).factor, kUncalibratedFactor);
 }
 
 TEST(CovarianceFactor, GrowsWithTheDistanceUpToABound) {

@@ -44,14 +44,19 @@ Eigen::Vector3d Vector3(const nlohmann::json& v, size_t begin = 0) {
 View ReadView(const nlohmann::json& scene, const nlohmann::json& json) {
   View view;
   const auto k = [&](size_t i, size_t j) { return json["K"][i][j].get<double>(); };
-  view.camera = {k(0, 0), k(1, 1), k(0, 2), k(1, 2), static_cast<int>(2.0 * k(0, 2)) + 1,
+  view.camera = {k(0, 0),
+                 k(1, 1),
+                 k(0, 2),
+                 k(1, 2),
+                 static_cast<int>(2.0 * k(0, 2)) + 1,
                  static_cast<int>(2.0 * k(1, 2)) + 1};
   const auto pixel = [&](const nlohmann::json& v, size_t begin = 0) {
     const double y = v[begin + 1].get<double>();
     return Eigen::Vector2d(v[begin].get<double>() - k(0, 1) / k(1, 1) * (y - k(1, 2)), y);
   };
   Eigen::Matrix3d rotation;
-  for (size_t i = 0; i < 3; ++i) rotation.row(static_cast<int>(i)) = Vector3(json["R_cam_from_world"][i]);
+  for (size_t i = 0; i < 3; ++i)
+    rotation.row(static_cast<int>(i)) = Vector3(json["R_cam_from_world"][i]);
   view.cam_from_world = {Eigen::Quaterniond(rotation).normalized(),
                          Vector3(json["t_cam_from_world"])};
   std::vector<double> depths;
@@ -75,9 +80,8 @@ double PerpendicularPx(const View& view, const Rigid3& pose) {
   std::vector<double> distances;
   for (const LineObservation& line : view.lines) {
     for (const Eigen::Vector2d& end : {line.part_px.start, line.part_px.end}) {
-      const auto distance =
-          DistanceToLine(view.camera, pose * line.line_in_world.start,
-                         pose * line.line_in_world.end, end);
+      const auto distance = DistanceToLine(view.camera, pose * line.line_in_world.start,
+                                           pose * line.line_in_world.end, end);
       distances.push_back(distance ? std::abs(distance->residual_px) : 1e3);
     }
   }
@@ -113,16 +117,15 @@ TEST_P(VggScene, ADisplacedPoseComesBack) {
   int trials = 0, converged_lines = 0, converged_joint = 0;
   for (const auto& json : scene["views"]) {
     const View view = ReadView(scene, json);
-    // In three views the points hold the pose where the reconstruction has it, and its own lines are
-    // farther off there.
+    // In three views the points hold the pose where the reconstruction has it, and its own lines
+    // are farther off there.
     const double joint_px = std::max(kConvergedPx, PerpendicularPx(view, view.cam_from_world));
     for (int trial = 0; trial < kTrialsPerView; ++trial, ++trials) {
       const Rigid3& pose = view.cam_from_world;
       const Eigen::Quaterniond rotation =
           (ExpSo3(kDisplacementDeg * std::numbers::pi / 180.0 * direction()) * pose.rotation)
               .normalized();
-      const Eigen::Vector3d center =
-          pose.Center() + kDisplacementShare * view.depth * direction();
+      const Eigen::Vector3d center = pose.Center() + kDisplacementShare * view.depth * direction();
       const Rigid3 start{rotation, -(rotation * center)};
       EXPECT_GT(PerpendicularPx(view, start), 1.0);
       const double lines = PerpendicularPx(view, Solve(view, start, false));

@@ -4,8 +4,8 @@
 #include <numbers>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
+#include <Eigen/Cholesky>
 
 #include "plumb/runtime/covariance_calibration.h"
 #include "plumb/runtime/pose_refiner.h"

@@ -62,8 +62,10 @@ TEST(RotationSearch, KeepsTheRotationWhateverThePosition) {
     clusterer.Cluster(in_prior, 12, &clusters);
     std::vector<Eigen::Matrix3f> rotations;
     search.Search(camera, testing::Render(testing::RoomLines(), truth, 10 + k), clusters,
-                  {.num_draws = 1500, .num_kept = 24, .spread = {.sigma_rad = static_cast<float>(8.0 * kDegree / std::sqrt(3.0))}}, &random,
-                  &rotations);
+                  {.num_draws = 1500,
+                   .num_kept = 24,
+                   .spread = {.sigma_rad = static_cast<float>(8.0 * kDegree / std::sqrt(3.0))}},
+                  &random, &rotations);
     ASSERT_EQ(rotations.size(), 24u);
     double nearest = 10.0;
     for (const Eigen::Matrix3f& rotation : rotations) {

@@ -6,14 +6,14 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include "plumb/map/line_map.h"
 #include "tests/tools/program_run.h"
-#include "tools/synth/sequence_writer.h"
+#include "tests/tools/small_room.h"
 
 namespace plumb::tools {
 namespace {
@@ -35,14 +35,7 @@ class Replay : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     room_ = new TemporaryDirectory;
-    synth::SequenceOptions options;
-    options.seed = 2;
-    options.num_frames = kNumFrames;
-    options.sweep_deg = 20.0;
-    options.width_px = 320;
-    options.height_px = 240;
-    options.focal_px = 262.5;
-    options.samples_per_axis = 2;
+    const synth::SequenceOptions options = testing::SmallRoom(kNumFrames, 20.0);
     const Status written = synth::WriteSequence(options, room_->path(), {});
     ASSERT_TRUE(written) << written.error().message;
     const ProgramRun built = RunPlumbline(BuildArguments(room_->path()) + " --out " + Map());
@@ -196,8 +189,8 @@ TEST_F(Replay, GravityHasALineForEveryFrame) {
     std::string stamp;
     numbers >> stamp;
     for (int i = 0; i < 7; ++i) numbers >> v[i];
-    const Eigen::Vector3d down = Eigen::Quaterniond(v[6], v[3], v[4], v[5]).conjugate() *
-                                 Eigen::Vector3d(0.0, 0.0, -9.8);
+    const Eigen::Vector3d down =
+        Eigen::Quaterniond(v[6], v[3], v[4], v[5]).conjugate() * Eigen::Vector3d(0.0, 0.0, -9.8);
     std::ostringstream record;
     record << stamp << ' ' << down.x() << ' ' << down.y() << ' ' << down.z() << '\n';
     text += record.str();
@@ -213,13 +206,13 @@ TEST_F(Replay, GravityHasALineForEveryFrame) {
   ExpectFailure(arguments, 64, "--gravity-in-world");
   ExpectFailure(arguments + " --gravity-in-world 0,0,0", 64, "want a direction");
   const std::string short_file = dir_.Write("short.txt", text.substr(0, text.find('\n')));
-  ExpectFailure(ReplayArguments(Priors(), Map()) + " --gravity-in-world 0,0,-1 --gravity " +
-                    short_file,
-                65, "has no line for frame");
+  ExpectFailure(
+      ReplayArguments(Priors(), Map()) + " --gravity-in-world 0,0,-1 --gravity " + short_file, 65,
+      "has no line for frame");
   const std::string bad_file = dir_.Write("bad.txt", "1.0 0 0\n");
-  ExpectFailure(ReplayArguments(Priors(), Map()) + " --gravity-in-world 0,0,-1 --gravity " +
-                    bad_file,
-                65, "bad.txt:1: want");
+  ExpectFailure(
+      ReplayArguments(Priors(), Map()) + " --gravity-in-world 0,0,-1 --gravity " + bad_file, 65,
+      "bad.txt:1: want");
 }
 
 TEST_F(Replay, MapExportWritesPlyAndObj) {

@@ -9,8 +9,8 @@
 
 #include "tests/tools/colmap_files.h"
 #include "tests/tools/program_run.h"
+#include "tests/tools/small_room.h"
 #include "tools/datasets/tum_sequence.h"
-#include "tools/synth/sequence_writer.h"
 
 namespace plumb::tools {
 namespace {
@@ -32,14 +32,7 @@ class ViewsMap : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     room_ = new TemporaryDirectory;
-    synth::SequenceOptions options;
-    options.seed = 2;
-    options.num_frames = kNumFrames;
-    options.sweep_deg = 40.0;
-    options.width_px = 320;
-    options.height_px = 240;
-    options.focal_px = 262.5;
-    options.samples_per_axis = 2;
+    synth::SequenceOptions options = testing::SmallRoom(kNumFrames, 40.0);
     options.shadows = false;
     options.lens = *MakeLens(LensModel::kRadTan, std::vector<double>{-0.1, 0.02, 0.001, -0.001});
     const Status written = synth::WriteSequence(options, room_->path(), {});

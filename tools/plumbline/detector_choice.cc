@@ -130,4 +130,11 @@ Outcome CreateDetector(const DetectorOptions& options,
   return std::nullopt;
 }
 
+Result<std::vector<Segment2>> DetectRefined(const ImageView& image, const Rectifier& rectifier,
+                                            LineDetector* detector, SegmentRefiner* refiner) {
+  const Result<std::vector<Segment2>> raw = detector->Detect(image);
+  if (!raw) return raw.error();
+  return refiner->Refine(image, *raw, &rectifier);
+}
+
 }  // namespace plumb::tools

@@ -4,10 +4,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "plumb/features/line_detector.h"
+#include "plumb/features/segment_refiner.h"
+#include "plumb/geometry/rectifier.h"
 #include "plumb/gpu/device.h"
 #include "tools/plumbline/exit_code.h"
 
@@ -40,5 +43,10 @@ Outcome OpenDevice(const std::string& selector, std::shared_ptr<gpu::Device>* ou
 /// assets/models/NAME.safetensors and share/plumbline/models/NAME.safetensors in the folders above
 /// the program.
 Outcome CreateDetector(const DetectorOptions& options, std::unique_ptr<LineDetector>* out_detector);
+
+/// An image's segments, detected and moved on to its edges, as maps and poses use them.
+/// @param rectifier  Of the image's lens.
+Result<std::vector<Segment2>> DetectRefined(const ImageView& image, const Rectifier& rectifier,
+                                            LineDetector* detector, SegmentRefiner* refiner);
 
 }  // namespace plumb::tools

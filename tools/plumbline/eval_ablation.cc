@@ -118,10 +118,10 @@ class Ablation {
     }
     const Result<cv::Mat> image = ReadColorImage(frame.color_path);
     if (!image) return FailureFrom(image.error());
-    const ImageView view = ViewOf(*image);
-    const Result<std::vector<Segment2>> raw = run_->detector->Detect(view);
-    if (!raw) return FailureFrom(raw.error());
-    segments_ = segment_refiner_.Refine(view, *raw, &run_->sequence.rectifier);
+    Result<std::vector<Segment2>> segments = DetectRefined(ViewOf(*image), run_->sequence.rectifier,
+                                                           run_->detector.get(), &segment_refiner_);
+    if (!segments) return FailureFrom(segments.error());
+    segments_ = *std::move(segments);
     if (run_->with_points) {
       const Status extracted = point_front_end_.ExtractQuery(*image, run_->sequence.rectifier);
       if (!extracted) return FailureFrom(extracted.error());
@@ -161,8 +161,8 @@ class Ablation {
         return FailureFrom(refined.error());
       }
       Row& row = rows_[prior_set][v];
-      row.frames.push_back({*run_->frames[index].cam_from_world, prior.cam_from_world,
-                            result_.cam_from_world});
+      row.frames.push_back(
+          {*run_->frames[index].cam_from_world, prior.cam_from_world, result_.cam_from_world});
       row.ms.push_back(1e-6 * static_cast<double>(result_.total_ns));
       row.num_refined += result_.status == RefineStatus::kRefined ? 1 : 0;
     }
@@ -185,7 +185,8 @@ double RefinedShare(const Row& row) {
 
 std::string ToMarkdown(const std::vector<PriorSet>& prior_sets, const Rows& rows) {
   std::string text =
-      "| prior | features | matching | residual | median cm / deg | p90 | recall | harmed | refined "
+      "| prior | features | matching | residual | median cm / deg | p90 | recall | harmed | "
+      "refined "
       "| ms |\n|---|---|---|---|---|---|---|---|---|---|\n";
   for (size_t p = 0; p < rows.size(); ++p) {
     for (size_t v = 0; v < kVariants.size(); ++v) {
@@ -281,7 +282,8 @@ void AddEvalAblation(CLI::App& eval, PendingRun& pending) {
         command.footer(
             "Rows: {points, lines, joint} x {the paper's matching, search} x {the paper's "
             "residual, perpendicular}\n"
-            "from every prior; --points none leaves out what needs points. ms is matching and refinement "
+            "from every prior; --points none leaves out what needs points. ms is matching and "
+            "refinement "
             "alone.\n"
             "Example:\n"
             "  plumbline eval ablation --sequence office --frames query.txt --map office.map "

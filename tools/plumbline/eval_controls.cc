@@ -59,10 +59,10 @@ Outcome DetectAll(FrameRun* run, std::vector<std::vector<Segment2>>* out_segment
     if (Outcome interrupted = CheckInterrupt()) return interrupted;
     const Result<cv::Mat> image = ReadColorImage(frame.color_path);
     if (!image) return FailureFrom(image.error());
-    const ImageView view = ViewOf(*image);
-    const Result<std::vector<Segment2>> raw = run->detector->Detect(view);
-    if (!raw) return FailureFrom(raw.error());
-    out_segments->push_back(refiner.Refine(view, *raw, &run->sequence.rectifier));
+    Result<std::vector<Segment2>> segments =
+        DetectRefined(ViewOf(*image), run->sequence.rectifier, run->detector.get(), &refiner);
+    if (!segments) return FailureFrom(segments.error());
+    out_segments->push_back(*std::move(segments));
     progress.Advance();
   }
   return std::nullopt;

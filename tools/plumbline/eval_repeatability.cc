@@ -108,7 +108,8 @@ class Evaluation {
 Outcome SelectPairs(const EvalRepeatabilityOptions& options, TumSequence* out_sequence,
                     std::vector<size_t>* out_firsts) {
   std::vector<SequenceFrame> listed;
-  if (Outcome failed = SelectPosedFrames(options.sequence, options.frames, true, out_sequence, &listed)) {
+  if (Outcome failed =
+          SelectPosedFrames(options.sequence, options.frames, true, out_sequence, &listed)) {
     return failed;
   }
   const auto step = static_cast<size_t>(options.step);

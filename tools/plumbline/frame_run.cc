@@ -172,8 +172,8 @@ Outcome ReadPriors(const std::string& path, const std::string& size,
     out_priors->push_back(prior);
   }
   if (num_missing == frames.size()) {
-    return Failure{kExitBadData, path + ": names none of the " + std::to_string(num_missing) +
-                                     " query frames"};
+    return Failure{kExitBadData,
+                   path + ": names none of the " + std::to_string(num_missing) + " query frames"};
   }
   if (num_missing > 0) {
     return Failure{kExitBadData, path + ": no pose for " + std::to_string(num_missing) +
@@ -303,9 +303,9 @@ Outcome RunFrames(FrameRun* run, const FrameSink& sink) {
           !found) {
         return FailFrame(frame, found.error());
       }
-      points = point_front_end.MatchQuery(run->sequence.camera, *run->index,
-                                          run->priors[i].cam_from_world,
-                                          run->session.refiner.method);
+      points =
+          point_front_end.MatchQuery(run->sequence.camera, *run->index,
+                                     run->priors[i].cam_from_world, run->session.refiner.method);
     }
     SessionFrame input;
     input.image = ViewOf(*image);

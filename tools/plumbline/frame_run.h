@@ -22,12 +22,12 @@ namespace plumb::tools {
 struct FrameRunOptions {
   std::string sequence, frames, priors, map;
   DetectorOptions detector;
-  std::string prior_size = "10,2";  // cm, deg
+  std::string prior_size = "10,2";        // cm, deg
   std::string gravity, gravity_in_world;  // a file, X,Y,Z; empty: not known
   double gravity_sigma_deg = 1.0;
-  std::string mode;                 // independent | stream
-  std::string method = "search";    // search | paper
-  std::string points = "none";      // none | opencv
+  std::string mode;               // independent | stream
+  std::string method = "search";  // search | paper
+  std::string points = "none";    // none | opencv
 };
 
 /// Declares --sequence, --frames, --map, --points and the detector's options.

@@ -75,10 +75,10 @@ class KeyFrameReader {
     }
     out->depth = images.depth;
 
-    const ImageView view = ViewOf(images.color);
-    const Result<std::vector<Segment2>> raw = detector_->Detect(view);
-    if (!raw) return FailureFrom(raw.error());
-    out->segments = refiner_.Refine(view, *raw, &rectifier);
+    Result<std::vector<Segment2>> segments =
+        DetectRefined(ViewOf(images.color), rectifier, detector_, &refiner_);
+    if (!segments) return FailureFrom(segments.error());
+    out->segments = *std::move(segments);
     KeyFrameInput& input = out->input;
     input.timestamp_ns = frame.timestamp_ns;
     input.cam_from_world = *frame.cam_from_world;

@@ -64,18 +64,18 @@ Outcome ReadQueries(FrameRun* run, const std::string& segments_path, size_t limi
       const Result<cv::Mat> image = ReadColorImage(frame.color_path);
       if (!image) return FailureFrom(image.error());
       if (segments_path.empty()) {
-        Result<std::vector<Segment2>> found = run->detector->Detect(ViewOf(*image));
+        Result<std::vector<Segment2>> found =
+            DetectRefined(ViewOf(*image), run->sequence.rectifier, run->detector.get(), &refiner);
         if (!found) return FailureFrom(found.error());
-        query.segments = refiner.Refine(ViewOf(*image), *found, &run->sequence.rectifier);
+        query.segments = *std::move(found);
       }
       if (run->with_points) {
         if (const Status extracted = points.ExtractQuery(*image, run->sequence.rectifier);
             !extracted) {
           return FailureFrom(extracted.error());
         }
-        query.points =
-            points.MatchQuery(run->sequence.camera, *run->index, query.prior.cam_from_world,
-                              run->session.refiner.method);
+        query.points = points.MatchQuery(run->sequence.camera, *run->index,
+                                         query.prior.cam_from_world, run->session.refiner.method);
         RectifyPoints(run->sequence.rectifier, &query.points);
       }
     }

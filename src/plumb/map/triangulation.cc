@@ -17,7 +17,7 @@ constexpr double kMinProjectedPx = 6.0;
 constexpr double kClearly = 0.8;  // score of another depth over that of the best one, at most
 constexpr int kAverageSteps = 2;
 constexpr int kMutualPasses = 2;
-constexpr int kPasses = 3;  // the last two with measured noise
+constexpr int kPasses = 3;                             // the last two with measured noise
 constexpr double kLeastNoise = 0.2, kMostNoise = 2.0;  // over what the options say
 constexpr size_t kMinScatters = 50;
 // Half of a hypothesis' variance comes from the segment's own noise, which its views share.

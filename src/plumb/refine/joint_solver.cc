@@ -131,9 +131,9 @@ std::optional<JointSolution> SolvePaperCost(const Camera& camera, const Rigid3& 
   int num_lines = 0, num_points = 0;
   for (const PaperLine& line : lines) {
     if (options.paper_residual == LineResidual::kPerpendicular) {
-      num_lines += problem.Add(
-          OverlapDistanceCost::Create(camera, line.line_in_world, line.segment_px, 1.0),
-          new ceres::HuberLoss(options.huber_px), alpha);
+      num_lines +=
+          problem.Add(OverlapDistanceCost::Create(camera, line.line_in_world, line.segment_px, 1.0),
+                      new ceres::HuberLoss(options.huber_px), alpha);
       continue;
     }
     // A line whose midpoint has no image contributes no angle either.

@@ -143,8 +143,7 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
   clusterer_.Cluster(lines_in_prior_, kMaxClusters, &clusters_);
   rotation_search_.Search(
       camera_, std::span(segments_).first(std::min(segments_.size(), kRotationSegments)), clusters_,
-      {.num_draws = options.num_hypotheses, .spread = spread},
-      &random, &rotations_);
+      {.num_draws = options.num_hypotheses, .spread = spread}, &random, &rotations_);
   for (uint32_t k = num_drawn; k < options.num_hypotheses; ++k) {
     const Eigen::Matrix3f& found =
         rotations_[random.Below(static_cast<uint32_t>(rotations_.size()))];

@@ -20,8 +20,7 @@ PosePrior FuseGravity(const PosePrior& prior) {
   const Eigen::Vector3d predicted = pose.rotation * down_in_world;
   const double prior_variance = prior.rotation_sigma_rad * prior.rotation_sigma_rad / 3.0;
   const double variance = prior.gravity->sigma_rad * prior.gravity->sigma_rad;
-  const double angle =
-      std::atan2(predicted.cross(measured).norm(), predicted.dot(measured));
+  const double angle = std::atan2(predicted.cross(measured).norm(), predicted.dot(measured));
   if (angle * angle > kMaxDeviations * kMaxDeviations * (prior_variance + variance)) {
     fused.gravity.reset();
     return fused;

@@ -23,8 +23,8 @@ void OneToOneSolver::Solve(const Camera& camera, std::span<const Segment2> segme
       paper_lines_.push_back(
           {lines[match.line], segments[match.segment], match.projected_length_px});
     }
-    const auto solution = SolvePaperCost(camera, *cam_from_world, paper_lines_, points,
-                                         {.paper_residual = residual});
+    const auto solution =
+        SolvePaperCost(camera, *cam_from_world, paper_lines_, points, {.paper_residual = residual});
     if (!solution) return;
     *cam_from_world = solution->cam_from_world;
   }

@@ -65,8 +65,8 @@ PosePriorFactor WeakFactor(const PosePrior& prior) {
   PosePriorFactor factor{prior.cam_from_world, kPriorFactorScale * prior.rotation_sigma_rad,
                          kPriorFactorScale * prior.position_sigma_m};
   if (prior.gravity) {
-    factor.tilt = TiltPrior{prior.gravity->down_in_camera,
-                            kPriorFactorScale * prior.gravity->sigma_rad};
+    factor.tilt =
+        TiltPrior{prior.gravity->down_in_camera, kPriorFactorScale * prior.gravity->sigma_rad};
   }
   return factor;
 }
@@ -80,9 +80,7 @@ SearchRegion RegionOf(const PosePrior& prior) {
   return region;
 }
 
-Matrix6d PriorInformation(const PosePrior& prior) {
-  return CovarianceOf(prior).inverse();
-}
+Matrix6d PriorInformation(const PosePrior& prior) { return CovarianceOf(prior).inverse(); }
 
 }  // namespace
 
@@ -221,6 +219,7 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
                                         uint32_t num_hypotheses, uint32_t num_tried) {
   Attempt attempt;
   attempt.alignment.cam_from_world = prior.cam_from_world;
+  survivors_.clear();
   Stopwatch watch;
   selector_.SelectForSearch(input.camera, prior.cam_from_world, prior.rotation_sigma_rad,
                             &search_lines_);
@@ -231,7 +230,6 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
   const std::span<const FoundPose> starts = FindStarts(input, prior, num_hypotheses);
   attempt.search_ns = watch.Lap();
   const auto schedule = input.search ? FineSchedule() : StreamSchedule();
-  survivors_.clear();
   const auto align_from = [&](const Rigid3& start) {
     watch.Lap();
     SelectFineLines(input.camera, start);
@@ -303,8 +301,7 @@ std::span<const FoundPose> SearchMethod::FindStarts(const RefineInput& input,
     lines_to_find_.push_back({line.segment_in_world, line.weight});
   }
   const std::span<const FoundPose> found = pose_search_.Search(
-      input.camera, RegionOf(prior),
-      lines_to_find_, segments_.segments,
+      input.camera, RegionOf(prior), lines_to_find_, segments_.segments,
       {.num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors, .deadline = deadline_},
       MixSeeds(options_.seed, input.seed));
   const PoseSearchTimes& times = pose_search_.times();

@@ -333,6 +333,22 @@ TEST(PoseRefiner, ManyPointsDecideWhereLinesDoNot) {
   EXPECT_EQ(result.num_observed_directions, 6);
 }
 
+TEST(PoseRefiner, LinesContradictPointsThatHoldAnotherPose) {
+  Scene scene(testing::RoomLines(), {.num_hypotheses = 500});
+  Random random(19);
+  for (int k = 0; k < 5; ++k) {
+    const Rigid3 truth = QueryPose(k);
+    const auto segments = Render(scene.lines, truth, 1250 + k);
+    // As many points as decide where lines do not, all of them on something that has moved.
+    const auto points = RenderPoints(Disturb(truth, 0.2, 3.0 * kDegree, &random), 150, 0.1, 4);
+    RefineInput input = InputOf(segments, Disturb(truth, 0.1, 2.0 * kDegree, &random));
+    input.points = points;
+    const RefineResult result = scene.Refine(input);
+    EXPECT_EQ(ToString(result.status), "REFINED") << "query " << k;
+    EXPECT_LT(DistanceBetween(result.cam_from_world, truth).position_m, 0.03) << "query " << k;
+  }
+}
+
 TEST(PoseRefiner, WrongPointsDoNotMoveThePose) {
   Scene scene(testing::RoomLines());
   const auto points = RenderPoints(QueryPose(3), 150, 1.0, 3);

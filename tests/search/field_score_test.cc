@@ -166,8 +166,7 @@ TEST(FieldScore, EqualsItsDefinition) {
     inside += sample.weight;
     support += sample.weight / ((1 + r * r) * (1 + r * r));
   }
-  // The quick arctangent moves a few samples to the next channel.
-  EXPECT_NEAR(view.Score(at, sigma), support / (0.8 * inside + 0.2 * total), 0.02);
+  EXPECT_NEAR(view.Score(at, sigma), support / (0.8 * inside + 0.2 * total), 1e-3);
 }
 
 TEST(FieldScore, PosesThatSeeNothingGetNothing) {

@@ -95,6 +95,35 @@ TEST(PoseSearch, FindsThePoseFromTwentyCentimetresAndFourDegrees) {
   }
 }
 
+TEST(PoseSearch, FewStartsFindThePoseFromTenCentimetresAndTwoDegrees) {
+  PoseSearch search;
+  Random random(5);
+  const auto lines = RoomSearchLines();
+  for (int k = 0; k < 6; ++k) {
+    const Rigid3 truth = QueryPose(k);
+    const auto segments = testing::Render(testing::RoomLines(), truth, 40 + k);
+    const Rigid3 prior = Disturb(truth, 0.10, 2.0 * kDegree, &random);
+    const auto found = search.Search(
+        testing::RoomCamera(), {prior, 2.0 * kDegree, 0.10}, lines, segments,
+        {.num_hypotheses = 500, .num_aligned = 12, .num_wide = 0, .num_survivors = 1}, k);
+    ASSERT_EQ(found.size(), 1u);
+    const PoseDistance error = DistanceBetween(found[0].cam_from_world, truth);
+    EXPECT_LT(error.position_m, 0.06) << "query " << k;
+    EXPECT_LT(error.rotation_rad, 1.4 * kDegree) << "query " << k;
+  }
+}
+
+TEST(PoseSearch, WithoutAlignedStartsThePriorIsLeft) {
+  PoseSearch search;
+  const auto lines = RoomSearchLines();
+  const Rigid3 truth = QueryPose(1);
+  const auto segments = testing::Render(testing::RoomLines(), truth, 3);
+  const auto found = search.Search(testing::RoomCamera(), {truth, 0.01, 0.03}, lines, segments,
+                                   {.num_hypotheses = 100, .num_aligned = 0}, 0);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_LT(DistanceBetween(found[0].cam_from_world, truth).position_m, 0.03);
+}
+
 TEST(PoseSearch, SurvivorsAreDistinctBestFirstAndBounded) {
   PoseSearch search;
   const Rigid3 truth = LookAlong({0.5, 0.05, 0.02}, {1.0, 0.05, 0.03});

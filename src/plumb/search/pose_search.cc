@@ -21,8 +21,8 @@ constexpr double kScoringSigmaPx = 20.0;
 constexpr size_t kFewStride = 8, kSecondPassDivisor = 12, kMinSecondPass = 96;
 constexpr size_t kScoredAtOnce = 64;  // between two looks at the clock
 
-// The alignment: so many steps at each sigma, then the best are kept. Wide sigmas are served by
-// every second sample.
+// The alignment: so many steps at each sigma, then the best are kept, out of kUsualAligned starts
+// and in proportion. Wide sigmas are served by every second sample.
 struct Level {
   double sigma_px;
   int num_steps;
@@ -31,9 +31,9 @@ struct Level {
 };
 constexpr Level kLevels[] = {{30.0, 3, 12, false}, {20.0, 3, 8, false}, {12.0, 2, 28, false},
                              {12.0, 2, 18, false}, {6.0, 3, 10, true},  {3.0, 2, 8, true}};
-constexpr size_t kNumFirst = 20;   // hypotheses at the first level
+constexpr size_t kUsualAligned = 32;
 constexpr size_t kLateLevel = 2;   // where all enter, past the widest sigmas
-constexpr size_t kMinAligned = 8;  // so few are not ranked
+constexpr size_t kMinAligned = 8;  // so few are not ranked, likewise in proportion
 // Aligned poses nearer than this are one.
 constexpr float kDuplicatePositionM = 0.01f, kDuplicateRotationRad = 0.005f;
 constexpr double kFinalSigmaPx = 3.0;
@@ -192,7 +192,10 @@ void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& opti
   TakeEvery(samples_, 2, &half_samples_);
   late_ = hypotheses_;
   is_ranked_ = false;
-  hypotheses_.resize(std::min(hypotheses_.size(), kNumFirst));
+  hypotheses_.resize(std::min(hypotheses_.size(), options.num_wide));
+  const auto share = [&](size_t count) {
+    return std::max<size_t>(1, (count * options.num_aligned + kUsualAligned - 1) / kUsualAligned);
+  };
   for (size_t i = 0; i < std::size(kLevels); ++i) {
     // The late ones enter in any case: better a few levels of all than all of a few.
     if (i > kLateLevel && options.deadline.HasPassed(options.align_share)) return;
@@ -208,11 +211,11 @@ void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& opti
       h.pose = aligner_.Align(camera_, field_, samples, h.pose, alignment);
     }
     is_ranked_ = false;
-    if (hypotheses_.size() <= kMinAligned) continue;
+    if (hypotheses_.size() <= share(kMinAligned)) continue;
     Rank(level.sigma_px, samples);
     is_ranked_ = i + 1 == std::size(kLevels);
     DropDuplicates();
-    if (hypotheses_.size() > level.num_kept) hypotheses_.resize(level.num_kept);
+    hypotheses_.resize(std::min(hypotheses_.size(), share(level.num_kept)));
   }
 }
 

@@ -34,6 +34,7 @@ struct SearchRegion {
 struct PoseSearchOptions {
   uint32_t num_hypotheses = 1500;
   size_t num_aligned = 32;   // best hypotheses that are aligned, beside the prior itself
+  size_t num_wide = 20;      // of them, also aligned from the widest sigma on
   size_t num_survivors = 4;  // distinct poses returned at most
   /// Shares of it after which no more hypotheses are scored, and none aligned further.
   Deadline deadline = {};
@@ -57,9 +58,10 @@ struct FoundPose {
 /// field of quarter resolution: all of them by an eighth of the samples, the better ones by all.
 /// The best are aligned on the same field while sigma shrinks from 30 to 3 px, and once more from
 /// 12 px only: at 30 px most starts run into one optimum, which need not be the right one. At each
-/// level duplicates and the worse ones are dropped. Images wider than 960 px are searched as if
-/// 640 px wide. Equal inputs and seeds give equal results. Owns its work space, does not allocate
-/// once warm; not thread-safe. Source: docs/method/association.md.
+/// level duplicates and the worse ones are dropped, more of them where fewer are aligned. Images
+/// wider than 960 px are searched as if 640 px wide. Equal inputs and seeds give equal results.
+/// Owns its work space, does not allocate once warm; not thread-safe.
+/// Source: docs/method/association.md.
 class PoseSearch {
  public:
   /// @return up to num_survivors poses, best first, any two more than 2 cm or 0.01 rad apart; valid

@@ -46,6 +46,8 @@ constexpr double kShareOfKeyFrames = 0.15, kPlentyOfNats = 60.0;
 constexpr size_t kMinPoints = 6;
 // A pose from points alone is a start for the lines, and with many points an answer.
 constexpr size_t kMinSolvingPoints = 12, kMinDecidingPoints = 40;
+// Beside points that decide, the search has only to contradict them: its best pose out of so many.
+constexpr size_t kAlignedBesidePoints = 12;
 
 // The joint solution's last word.
 constexpr double kLineRobust = 1.0;  // as in the steps before
@@ -250,10 +252,7 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
     survivor.support = MeasureSupport(input.camera, survivor.alignment.cam_from_world);
     stages_.support_ns += watch.Lap();
   };
-  // Points that decide are a start too; beside it the search's best is enough to contradict them.
-  const size_t num_starts =
-      HoldsByPoints(input) ? std::min<size_t>(1, starts.size()) : starts.size();
-  for (const FoundPose& start : starts.first(num_starts)) {
+  for (const FoundPose& start : starts) {
     if (!survivors_.empty() && IsOutOfTime(kStartsShare)) break;
     align_from(start.cam_from_world);
   }
@@ -300,10 +299,16 @@ std::span<const FoundPose> SearchMethod::FindStarts(const RefineInput& input,
   for (const CandidateLine& line : search_lines_) {
     lines_to_find_.push_back({line.segment_in_world, line.weight});
   }
-  const std::span<const FoundPose> found = pose_search_.Search(
-      input.camera, RegionOf(prior), lines_to_find_, segments_.segments,
-      {.num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors, .deadline = deadline_},
-      MixSeeds(options_.seed, input.seed));
+  PoseSearchOptions search{
+      .num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors, .deadline = deadline_};
+  if (HoldsByPoints(input)) {
+    search.num_aligned = kAlignedBesidePoints;
+    search.num_wide = 0;
+    search.num_survivors = 1;
+  }
+  const std::span<const FoundPose> found =
+      pose_search_.Search(input.camera, RegionOf(prior), lines_to_find_, segments_.segments, search,
+                          MixSeeds(options_.seed, input.seed));
   const PoseSearchTimes& times = pose_search_.times();
   stages_.field_ns += times.field_ns;
   stages_.score_ns += times.draw_ns + times.score_ns;

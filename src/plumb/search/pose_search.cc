@@ -17,7 +17,8 @@ constexpr int kMaxSearchWidthPx = 960, kReducedWidthPx = 640;
 
 constexpr DirectionFieldOptions kField{.cell_px = 4, .tolerance_rad = 10.0 * kDegree};
 constexpr double kScoringSigmaPx = 20.0;
-// First pass: every so manieth sample; so small a share of the hypotheses enters the second.
+// First pass: every so manieth sample; so small a share of the hypotheses enters the second where
+// kUsualAligned of them are aligned, and in proportion.
 constexpr size_t kFewStride = 8, kSecondPassDivisor = 12, kMinSecondPass = 96;
 constexpr size_t kScoredAtOnce = 64;  // between two looks at the clock
 
@@ -60,6 +61,11 @@ Camera Reduce(const Camera& camera, double scale) {
   out.width_px = std::max(1, static_cast<int>(std::lround(camera.width_px * scale)));
   out.height_px = std::max(1, static_cast<int>(std::lround(camera.height_px * scale)));
   return out;
+}
+
+/// What `count` out of kUsualAligned becomes where another number is aligned.
+size_t ShareOf(size_t count, const PoseSearchOptions& options) {
+  return std::max<size_t>(1, (count * options.num_aligned + kUsualAligned - 1) / kUsualAligned);
 }
 
 }  // namespace
@@ -154,7 +160,8 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
 
 void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
   const size_t num_second =
-      std::max({kMinSecondPass, options.num_aligned, hypotheses_.size() / kSecondPassDivisor});
+      std::max(ShareOf(std::max(kMinSecondPass, hypotheses_.size() / kSecondPassDivisor), options),
+               options.num_aligned);
   if (num_second < hypotheses_.size()) {
     TakeEvery(samples_, kFewStride, &few_samples_);
     scorer_.Prepare(camera_, field_, kScoringSigmaPx);
@@ -193,9 +200,6 @@ void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& opti
   late_ = hypotheses_;
   is_ranked_ = false;
   hypotheses_.resize(std::min(hypotheses_.size(), options.num_wide));
-  const auto share = [&](size_t count) {
-    return std::max<size_t>(1, (count * options.num_aligned + kUsualAligned - 1) / kUsualAligned);
-  };
   for (size_t i = 0; i < std::size(kLevels); ++i) {
     // The late ones enter in any case: better a few levels of all than all of a few.
     if (i > kLateLevel && options.deadline.HasPassed(options.align_share)) return;
@@ -211,11 +215,11 @@ void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& opti
       h.pose = aligner_.Align(camera_, field_, samples, h.pose, alignment);
     }
     is_ranked_ = false;
-    if (hypotheses_.size() <= share(kMinAligned)) continue;
+    if (hypotheses_.size() <= ShareOf(kMinAligned, options)) continue;
     Rank(level.sigma_px, samples);
     is_ranked_ = i + 1 == std::size(kLevels);
     DropDuplicates();
-    hypotheses_.resize(std::min(hypotheses_.size(), share(level.num_kept)));
+    hypotheses_.resize(std::min(hypotheses_.size(), ShareOf(level.num_kept, options)));
   }
 }
 

@@ -166,7 +166,8 @@ TEST(FieldScore, EqualsItsDefinition) {
     inside += sample.weight;
     support += sample.weight / ((1 + r * r) * (1 + r * r));
   }
-  EXPECT_NEAR(view.Score(at, sigma), support / (0.8 * inside + 0.2 * total), 1e-3);
+  // The quick arctangent moves a few samples to the next channel.
+  EXPECT_NEAR(view.Score(at, sigma), support / (0.8 * inside + 0.2 * total), 0.02);
 }
 
 TEST(FieldScore, PosesThatSeeNothingGetNothing) {

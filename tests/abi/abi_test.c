@@ -357,6 +357,96 @@ static void test_lenses(const fixture* f, const plumb_map* map) {
   EXPECT(translation_error(f, 0, result.t_m) < 0.01);
 }
 
+static plumb_pose_prior make_prior(const double q[4], const double t[3]) {
+  plumb_pose_prior prior;
+  memset(&prior, 0, sizeof prior);
+  prior.struct_size = sizeof prior;
+  memcpy(prior.q_xyzw, q, sizeof prior.q_xyzw);
+  memcpy(prior.t_m, t, sizeof prior.t_m);
+  return prior;
+}
+
+/* As a later version may have it. */
+typedef struct longer_prior {
+  plumb_pose_prior prior;
+  double added;
+} longer_prior;
+
+/* The right one of several places is refined, wherever it stands; broken ones are named. */
+static void test_more_priors(const fixture* f, const plumb_map* map) {
+  const double far_t[3] = {f->true_t[0][0] + 1.0, f->true_t[0][1] - 0.8, f->true_t[0][2] + 0.6};
+  const plumb_session_options plain = make_options(map);
+  plumb_session_options options = plain;
+  plumb_session* session = make_session(&options);
+  plumb_pose_prior more[2];
+  longer_prior longer[2];
+  plumb_frame frame = make_frame(f, 0);
+  plumb_frame_result result;
+  EXPECT(refine_frame(&plain, &frame).prior_index == 0);
+  more[0] = make_prior(f->prior_q[0], far_t);
+  more[1] = make_prior(f->prior_q[0], f->prior_t[0]);
+  memcpy(frame.prior_t_m, far_t, sizeof far_t);
+  result = refine_frame(&plain, &frame);
+  EXPECT(result.status != PLUMB_STATUS_REFINED);
+  frame.more_priors = more;
+  frame.num_more_priors = 2;
+  result = refine_frame(&plain, &frame);
+  EXPECT(result.status == PLUMB_STATUS_REFINED);
+  EXPECT(result.prior_index == 2);
+  EXPECT(translation_error(f, 0, result.t_m) < 0.01);
+  frame.struct_size = (uint32_t)offsetof(plumb_frame, more_priors); /* from before there were any */
+  result = refine_frame(&plain, &frame);
+  EXPECT(result.status != PLUMB_STATUS_REFINED);
+  frame.struct_size = sizeof frame;
+  frame.num_more_priors = 1;
+  result = refine_frame(&plain, &frame); /* both are wrong: the frame's own is kept */
+  EXPECT(result.status != PLUMB_STATUS_REFINED);
+  EXPECT(result.prior_index == 0);
+  EXPECT(memcmp(result.t_m, far_t, sizeof far_t) == 0);
+
+  /* A newer caller's entries are longer. */
+  memset(longer, 0, sizeof longer);
+  longer[0].prior = more[0];
+  longer[1].prior = more[1];
+  longer[0].prior.struct_size = longer[1].prior.struct_size = sizeof longer[0];
+  frame.more_priors = &longer[0].prior;
+  frame.num_more_priors = 2;
+  result = refine_frame(&plain, &frame);
+  EXPECT(result.prior_index == 2);
+  EXPECT(translation_error(f, 0, result.t_m) < 0.01);
+  longer[1].added = 1.0;
+  EXPECT_ERROR(plumb_session_submit_frame(session, &frame), PLUMB_ERROR_UNSUPPORTED,
+               "more_priors[1]");
+
+  frame.more_priors = more;
+#define EXPECT_REFUSED(change, part)                                                               \
+  do {                                                                                             \
+    more[1] = make_prior(f->prior_q[0], f->prior_t[0]);                                            \
+    change;                                                                                        \
+    EXPECT_ERROR(plumb_session_submit_frame(session, &frame), PLUMB_ERROR_INVALID_ARGUMENT, part); \
+  } while (0)
+  EXPECT_REFUSED(more[1].struct_size = 0, "more_priors[1]: plumb_pose_prior.struct_size 0");
+  EXPECT_REFUSED(more[1].struct_size = sizeof longer[0], "more_priors[1].struct_size 376");
+  EXPECT_REFUSED(more[1].uncertainty = 7, "more_priors[1].uncertainty 7");
+  EXPECT_REFUSED(more[1].t_m[2] = NAN, "more_priors[1].q_xyzw or t_m is not finite");
+  EXPECT_REFUSED(more[1].q_xyzw[0] = 3.0, "more_priors[1].q_xyzw has norm");
+  EXPECT_REFUSED(more[1].position_sigma_m = -0.25, "more_priors[1].position_sigma_m -0.25");
+  EXPECT_REFUSED(more[1].uncertainty = PLUMB_UNCERTAINTY_COVARIANCE, "more_priors[1].covariance");
+  EXPECT_REFUSED(frame.more_priors = NULL, "more_priors is NULL");
+  frame.more_priors = more;
+  EXPECT_REFUSED(frame.num_more_priors = PLUMB_MAX_MORE_PRIORS + 1, "num_more_priors 9");
+  frame.num_more_priors = 2;
+  EXPECT_REFUSED(frame.reserved_priors = 1, "reserved_priors");
+  frame.reserved_priors = 0;
+#undef EXPECT_REFUSED
+  plumb_session_destroy(session);
+  options.method = PLUMB_METHOD_PAPER;
+  session = make_session(&options);
+  EXPECT_ERROR(plumb_session_submit_frame(session, &frame), PLUMB_ERROR_INVALID_ARGUMENT,
+               "more_priors has 2 entries");
+  plumb_session_destroy(session);
+}
+
 /* Each detection option changes what is found; a caller from before they were there has none. */
 static void test_detection_options(const fixture* f, const plumb_map* map) {
   const plumb_frame frame = make_frame(f, 0);
@@ -636,6 +726,7 @@ int main(int argc, char** argv) {
   test_covariance_as_prior(&f, map);
   test_points(&f, map);
   test_lenses(&f, map);
+  test_more_priors(&f, map);
   test_detection_options(&f, map);
   test_every_mode_and_method(&f, map);
   test_callbacks(&f, map);

@@ -33,6 +33,10 @@ CHECK(options_edges, offsetof(plumb_session_options, edge_min_length_px) == 168)
 CHECK(options_size, sizeof(plumb_session_options) == 176);
 #endif
 
+CHECK(pose_prior_rotation, offsetof(plumb_pose_prior, q_xyzw) == 8);
+CHECK(pose_prior_sizes, offsetof(plumb_pose_prior, position_sigma_m) == 64);
+CHECK(pose_prior_size, sizeof(plumb_pose_prior) == 368);
+
 CHECK(frame_planes, offsetof(plumb_frame, planes) == 16);
 #if UINTPTR_MAX == 0xffffffffffffffffu
 CHECK(frame_strides, offsetof(plumb_frame, row_stride_bytes) == 40);
@@ -44,7 +48,8 @@ CHECK(frame_release, offsetof(plumb_frame, release) == 512);
 CHECK(frame_lens, offsetof(plumb_frame, lens_model) == 528);
 CHECK(frame_distortion, offsetof(plumb_frame, lens_distortion) == 536);
 CHECK(frame_gravity, offsetof(plumb_frame, gravity_in_camera) == 600);
-CHECK(frame_size, sizeof(plumb_frame) == 656);
+CHECK(frame_more_priors, offsetof(plumb_frame, more_priors) == 656);
+CHECK(frame_size, sizeof(plumb_frame) == 672);
 #endif
 
 CHECK(frame_result_index, offsetof(plumb_frame_result, frame_index) == 16);
@@ -53,7 +58,8 @@ CHECK(frame_result_covariance, offsetof(plumb_frame_result, covariance) == 104);
 CHECK(frame_result_support, offsetof(plumb_frame_result, map_support) == 392);
 CHECK(frame_result_times, offsetof(plumb_frame_result, wait_ns) == 424);
 CHECK(frame_result_message, offsetof(plumb_frame_result, error_message) == 472);
-CHECK(frame_result_size, sizeof(plumb_frame_result) == 600);
+CHECK(frame_result_prior, offsetof(plumb_frame_result, prior_index) == 600);
+CHECK(frame_result_size, sizeof(plumb_frame_result) == 608);
 
 CHECK(stats_size, sizeof(plumb_session_stats) == 56);
 

@@ -5,6 +5,9 @@
 
 #include <cmath>
 #include <random>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "plumb/points/point_lifting.h"
 #include "support/textured_corner.h"
@@ -185,7 +188,7 @@ class RenderedPointsTest : public ::testing::Test {
 
   std::vector<PointCorrespondence> Match(const PointMatcherOptions& options = {}) {
     std::vector<PointCorrespondence> matches;
-    PointMatcher(options).Match(query_, MapIndex(map_), prior_, &matches);
+    PointMatcher(options).Match(query_, MapIndex(map_), {&prior_, 1}, &matches);
     return matches;
   }
   double ErrorPx(const PointCorrespondence& match) const {
@@ -227,6 +230,26 @@ TEST_F(RenderedPointsTest, OnlyTheNearestKeyFramesAreMatched) {
   EXPECT_LT(matches.size(), Match().size());
 }
 
+TEST_F(RenderedPointsTest, TheKeyFramesOfSeveralPriorsAreMatchedOnce) {
+  PointMatcherOptions options;
+  options.num_key_frames = 1;
+  // The places of all key frames, each of them twice.
+  std::vector<Rigid3> priors;
+  for (int round = 0; round < 2; ++round) {
+    for (const KeyFrame& key_frame : map_.key_frames) priors.push_back(key_frame.cam_from_world);
+  }
+  std::vector<PointCorrespondence> matches;
+  PointMatcher(options).Match(query_, MapIndex(map_), priors, &matches);
+  std::set<uint32_t> key_frames;
+  std::set<std::pair<uint32_t, uint32_t>> distinct;
+  for (const auto& match : matches) {
+    key_frames.insert(match.key_frame);
+    distinct.emplace(match.key_frame, match.map_point);
+  }
+  EXPECT_GT(key_frames.size(), 1u);
+  EXPECT_EQ(distinct.size(), matches.size());
+}
+
 TEST_F(RenderedPointsTest, GiveThePoseWithinMillimetres) {
   const auto matches = Match();
   const auto pose = EstimatePointPose(kCamera, matches);
@@ -250,11 +273,11 @@ TEST_F(RenderedPointsTest, AreTheSameEveryTime) {
 
 TEST_F(RenderedPointsTest, AnImageOrMapWithoutPointsMatchesNothing) {
   std::vector<PointCorrespondence> matches(3);
-  PointMatcher().Match({}, MapIndex(map_), prior_, &matches);
+  PointMatcher().Match({}, MapIndex(map_), {&prior_, 1}, &matches);
   EXPECT_TRUE(matches.empty());
   const LineMap empty;
   matches.resize(3);
-  PointMatcher().Match(query_, MapIndex(empty), prior_, &matches);
+  PointMatcher().Match(query_, MapIndex(empty), {&prior_, 1}, &matches);
   EXPECT_TRUE(matches.empty());
 }
 

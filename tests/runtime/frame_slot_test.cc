@@ -79,6 +79,25 @@ TEST(FrameSlot, AssignKeepsPointsAndNormalisesTheRotation) {
   EXPECT_DOUBLE_EQ(slot.ticket.prior.cam_from_world.rotation.norm(), 1.0);
 }
 
+TEST(FrameSlot, AssignKeepsTheOtherPriors) {
+  HostFrame host;
+  std::vector<PosePrior> more(2);
+  more[1].cam_from_world.rotation = Eigen::Quaterniond(1.0005, 0, 0, 0);
+  more[1].position_sigma_m = 0.7;
+  host.frame.more_priors = more;
+  ASSERT_TRUE(ValidateFrame(host.frame));
+  FrameSlot slot;
+  const auto rectifier = *Rectifier::Create(host.frame.camera);
+  slot.Assign(host.frame, rectifier, 0);
+  more.clear();  // They were borrowed.
+  ASSERT_EQ(slot.more_priors.size(), 2u);
+  EXPECT_DOUBLE_EQ(slot.more_priors[1].cam_from_world.rotation.norm(), 1.0);
+  EXPECT_EQ(slot.more_priors[1].position_sigma_m, 0.7);
+  host.frame.more_priors = {};
+  slot.Assign(host.frame, rectifier, 0);
+  EXPECT_TRUE(slot.more_priors.empty());
+}
+
 TEST(ValidateFrame, NamesWhatIsBroken) {
   HostFrame host;
   SessionFrame frame = host.frame;
@@ -102,6 +121,16 @@ TEST(ValidateFrame, NamesWhatIsBroken) {
   frame = host.frame;
   frame.prior.rotation_sigma_rad = kNan;
   ExpectRefused(frame, "prior.rotation_sigma_rad");
+  std::vector<PosePrior> more(2);
+  frame = host.frame;
+  frame.more_priors = more;
+  more[1].rotation_sigma_rad = -0.25;
+  ExpectRefused(frame, "more_priors[1].rotation_sigma_rad -0.25");
+  more[0].cam_from_world.translation.z() = kNan;
+  ExpectRefused(frame, "more_priors[0].cam_from_world is not finite");
+  more.assign(kMaxMorePriors + 1, PosePrior{});
+  frame.more_priors = more;
+  ExpectRefused(frame, "more_priors has 9 entries, more than 8");
   std::vector<PointMatch> points(2);
   points[1].pixel.x() = kNan;
   frame = host.frame;

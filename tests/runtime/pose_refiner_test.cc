@@ -3,13 +3,13 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <memory>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 
 #include "support/allocation_counter.h"
+#include "support/room_refiner.h"
 #include "support/synthetic_room.h"
 
 namespace plumb {
@@ -17,52 +17,14 @@ namespace {
 
 using testing::Disturb;
 using ::testing::HasSubstr;
+using testing::HaveSameBits;
+using testing::InputOf;
+using testing::kDegree;
 using testing::LookAlong;
+using testing::QueryPose;
 using testing::Render;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
-
-/// A room, its map and a refiner.
-struct Scene {
-  explicit Scene(std::vector<Segment3> segments, const PoseRefinerOptions& options = {})
-      : lines(std::move(segments)),
-        map(testing::MapOf(lines, testing::RoomKeyFrames())),
-        index(map),
-        refiner(std::move(*PoseRefiner::Create(index, options))) {}
-
-  RefineResult Refine(const RefineInput& input) {
-    RefineResult result;
-    const Status status = refiner->Refine(input, &result);
-    EXPECT_TRUE(status) << (status ? "" : status.error().message);
-    return result;
-  }
-
-  std::vector<Segment3> lines;
-  LineMap map;
-  MapIndex index;
-  std::unique_ptr<PoseRefiner> refiner;
-};
-
-RefineInput InputOf(const std::vector<Segment2>& segments, const Rigid3& prior,
-                    double position_sigma_m = 0.10, double rotation_sigma_rad = 2.0 * kDegree) {
-  RefineInput input;
-  input.camera = testing::RoomCamera();
-  input.segments = segments;
-  input.prior = {prior, position_sigma_m, rotation_sigma_rad};
-  return input;
-}
-
-/// A pose between the key frames.
-Rigid3 QueryPose(int k) {
-  return LookAlong({-1.2 + 0.27 * k, 0.4 - 0.1 * k, 0.15},
-                   {std::cos(0.6 * k), std::sin(0.6 * k), -0.15});
-}
-
-bool HaveSameBits(const Rigid3& a, const Rigid3& b) {
-  return std::memcmp(a.rotation.coeffs().data(), b.rotation.coeffs().data(), 4 * sizeof(double)) ==
-             0 &&
-         std::memcmp(a.translation.data(), b.translation.data(), 3 * sizeof(double)) == 0;
-}
+using testing::RenderPoints;
+using Scene = testing::RoomRefiner;
 
 TEST(PoseRefiner, ConvergesFromTenCentimetresAndTwoDegrees) {
   Scene scene(testing::RoomLines());
@@ -284,25 +246,6 @@ TEST(PoseRefiner, CovarianceIsOfTheErrorsSize) {
   // the map claims an uncertainty that it does not have.
   EXPECT_GT(squares[squares.size() / 2], 5.35 / 8);
   EXPECT_LT(squares[squares.size() / 2], 5.35 * 8);
-}
-
-/// Image points of random places in front of the camera.
-std::vector<PointMatch> RenderPoints(const Rigid3& pose, size_t count, double outlier_share,
-                                     uint64_t seed) {
-  Random random(seed);
-  const Camera camera = testing::RoomCamera();
-  std::vector<PointMatch> points;
-  while (points.size() < count) {
-    const Eigen::Vector3d x(testing::UniformIn(&random, -1.5, 1.5),
-                            testing::UniformIn(&random, -1.2, 1.2),
-                            testing::UniformIn(&random, 1.5, 4.0));
-    if (!camera.Contains(camera.Project(x))) continue;
-    PointMatch& match = points.emplace_back();
-    match.pixel = camera.Project(x) + 0.5 * random.Normal3(1.0f).head<2>().cast<double>();
-    match.point_in_world = pose.Inverse() * x;
-    if (random.Uniform() < outlier_share) match.pixel.x() += testing::UniformIn(&random, 15, 90);
-  }
-  return points;
 }
 
 TEST(PoseRefiner, PointsTakePartInTheRefinement) {

@@ -165,6 +165,44 @@ TEST_F(SessionTest, RefinesAPoseFromItsImage) {
   EXPECT_GT(result.refined.matches.size(), 10u);
 }
 
+// A metre and half a radian away from where frame `i` was taken.
+Rigid3 FarFrom(int i) {
+  Vector6d error;
+  error << 0.3, -0.3, 0.3, 0.6, -0.6, 0.5;
+  return Perturb(TruePose(i), error);
+}
+
+TEST_F(SessionTest, TheRightOneOfSeveralPriorsIsRefined) {
+  Start(Blocking());
+  SessionFrame frame = TheRoom().Frame(0, PriorError());
+  const std::vector<PosePrior> more = {{FarFrom(0)}, frame.prior};
+  frame.prior.cam_from_world = FarFrom(0);
+  frame.more_priors = more;
+  ASSERT_TRUE(session_->Submit(frame));
+  Submit(1);  // The next frame has one prior again.
+  FrameResult result = Next();
+  EXPECT_EQ(result.refined.status, RefineStatus::kRefined);
+  EXPECT_EQ(result.refined.prior_index, 2u);
+  EXPECT_LT(DistanceBetween(result.refined.cam_from_world, TruePose(0)).position_m, 0.01);
+  EXPECT_EQ(result.prior.cam_from_world.translation, FarFrom(0).translation);
+  result = Next();
+  EXPECT_EQ(result.refined.status, RefineStatus::kRefined);
+  EXPECT_EQ(result.refined.prior_index, 0u);
+}
+
+TEST_F(SessionTest, ThePapersMethodRefusesSeveralPriors) {
+  SessionOptions options = Blocking();
+  options.refiner.method = RefineMethod::kPaper;
+  Start(options);
+  SessionFrame frame = TheRoom().Frame(0, PriorError());
+  const std::vector<PosePrior> more = {frame.prior};
+  frame.more_priors = more;
+  const Result<SubmitOutcome> outcome = session_->Submit(frame);
+  ASSERT_FALSE(outcome);
+  EXPECT_EQ(outcome.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(outcome.error().message.find("more_priors has 1 entries"), std::string::npos);
+}
+
 TEST_F(SessionTest, TimesOfTheStagesAddUp) {
   Start(Blocking());
   Submit(0);

@@ -121,6 +121,30 @@ TEST_F(StreamTrackerTest, ComesBackAfterTheHostRelocalised) {
   EXPECT_LE(frames, 3);
 }
 
+TEST_F(StreamTrackerTest, AskMorePriorsWhenTheStreamIsLost) {
+  Vector6d lost;
+  lost << 0.3, -0.35, 0.3, 0.7, 0.6, -0.5;
+  const std::vector<PosePrior> hits = {{Perturb(TruePose(0), lost)}, {TruePose(0)}};
+  RefineInput first = Input(0, Perturb(TruePose(0), lost));
+  ASSERT_TRUE(tracker_->Track(first, &result_));
+  EXPECT_NE(result_.status, RefineStatus::kRefined) << "without them";
+  tracker_->Reset();
+  first.more_priors = hits;
+  ASSERT_TRUE(tracker_->Track(first, &result_));
+  EXPECT_EQ(ToString(result_.status), "REFINED");
+  EXPECT_EQ(result_.prior_index, 2u);
+  EXPECT_LT(DistanceBetween(result_.cam_from_world, TruePose(0)).position_m, 0.01);
+  // The correction is carried on, and nobody is asked while it holds.
+  for (int i = 1; i < 4; ++i) {
+    RefineInput next = Input(i, Perturb(TruePose(i), lost));
+    next.more_priors = hits;
+    ASSERT_TRUE(tracker_->Track(next, &result_));
+    EXPECT_LT(DistanceBetween(result_.cam_from_world, TruePose(i)).position_m, 0.01) << i;
+    EXPECT_FALSE(tracker_->searched()) << i;
+    EXPECT_EQ(result_.prior_index, 0u);
+  }
+}
+
 // One pose of the tracker is far off, and the next one is right again: a blunder, not a
 // relocalisation. The frame itself may be lost, the stream must not be.
 TEST_F(StreamTrackerTest, SurvivesAnOutlierOfTheTracker) {

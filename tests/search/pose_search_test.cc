@@ -85,8 +85,8 @@ TEST(PoseSearch, FindsThePoseFromTwentyCentimetresAndFourDegrees) {
     const Rigid3 truth = QueryPose(k);
     const auto segments = testing::Render(testing::RoomLines(), truth, 20 + k);
     const Rigid3 prior = Disturb(truth, 0.20, 4.0 * kDegree, &random);
-    const auto found =
-        search.Search(testing::RoomCamera(), {prior, 4.0 * kDegree, 0.20}, lines, segments, {}, k);
+    search.SetImage(testing::RoomCamera(), segments);
+    const auto found = search.Search({prior, 4.0 * kDegree, 0.20}, lines, {}, k);
     ASSERT_FALSE(found.empty());
     const PoseDistance error = DistanceBetween(found[0].cam_from_world, truth);
     // Near enough for the matching's first gate of 24 px.
@@ -103,8 +103,9 @@ TEST(PoseSearch, FewStartsFindThePoseFromTenCentimetresAndTwoDegrees) {
     const Rigid3 truth = QueryPose(k);
     const auto segments = testing::Render(testing::RoomLines(), truth, 40 + k);
     const Rigid3 prior = Disturb(truth, 0.10, 2.0 * kDegree, &random);
+    search.SetImage(testing::RoomCamera(), segments);
     const auto found = search.Search(
-        testing::RoomCamera(), {prior, 2.0 * kDegree, 0.10}, lines, segments,
+        {prior, 2.0 * kDegree, 0.10}, lines,
         {.num_hypotheses = 500, .num_aligned = 12, .num_wide = 0, .num_survivors = 1}, k);
     ASSERT_EQ(found.size(), 1u);
     const PoseDistance error = DistanceBetween(found[0].cam_from_world, truth);
@@ -118,8 +119,9 @@ TEST(PoseSearch, WithoutAlignedStartsThePriorIsLeft) {
   const auto lines = RoomSearchLines();
   const Rigid3 truth = QueryPose(1);
   const auto segments = testing::Render(testing::RoomLines(), truth, 3);
-  const auto found = search.Search(testing::RoomCamera(), {truth, 0.01, 0.03}, lines, segments,
-                                   {.num_hypotheses = 100, .num_aligned = 0}, 0);
+  search.SetImage(testing::RoomCamera(), segments);
+  const auto found =
+      search.Search({truth, 0.01, 0.03}, lines, {.num_hypotheses = 100, .num_aligned = 0}, 0);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_LT(DistanceBetween(found[0].cam_from_world, truth).position_m, 0.03);
 }
@@ -130,8 +132,8 @@ TEST(PoseSearch, SurvivorsAreDistinctBestFirstAndBounded) {
   std::vector<SearchLine> lines;
   for (const Segment3& line : testing::FenceLines(0.2)) lines.push_back({line, 1.0});
   const auto segments = testing::Render(testing::FenceLines(0.2), truth, 1);
-  const auto found = search.Search(testing::RoomCamera(), {truth, 2.0 * kDegree, 0.3}, lines,
-                                   segments, {.num_survivors = 3}, 5);
+  search.SetImage(testing::RoomCamera(), segments);
+  const auto found = search.Search({truth, 2.0 * kDegree, 0.3}, lines, {.num_survivors = 3}, 5);
   ASSERT_LE(found.size(), 3u);
   ASSERT_GE(found.size(), 2u);  // a fence looks alike in many places
   for (size_t i = 1; i < found.size(); ++i) {
@@ -148,9 +150,11 @@ TEST(PoseSearch, EqualSeedsGiveEqualBits) {
   const auto lines = RoomSearchLines();
   const auto segments = testing::Render(testing::RoomLines(), QueryPose(1), 2);
   const SearchRegion region{QueryPose(1), 8.0 * kDegree, 0.4};
-  a.Search(testing::RoomCamera(), {QueryPose(2), 0.1, 0.1}, lines, segments, {}, 1);
-  const auto x = a.Search(testing::RoomCamera(), region, lines, segments, {}, 9);
-  const auto y = b.Search(testing::RoomCamera(), region, lines, segments, {}, 9);
+  a.SetImage(testing::RoomCamera(), segments);
+  b.SetImage(testing::RoomCamera(), segments);
+  a.Search({QueryPose(2), 0.1, 0.1}, lines, {}, 1);  // Leaves the image as it is.
+  const auto x = a.Search(region, lines, {}, 9);
+  const auto y = b.Search(region, lines, {}, 9);
   ASSERT_EQ(x.size(), y.size());
   for (size_t i = 0; i < x.size(); ++i) {
     EXPECT_EQ(x[i].score, y[i].score);
@@ -179,10 +183,15 @@ TEST(PoseSearch, NothingIsFoundWithoutLinesOrSegments) {
   const auto lines = RoomSearchLines();
   const auto segments = testing::Render(testing::RoomLines(), QueryPose(0), 2);
   const SearchRegion region{QueryPose(0), 0.03, 0.1};
-  EXPECT_TRUE(search.Search(testing::RoomCamera(), region, {}, segments, {}, 0).empty());
-  EXPECT_TRUE(search.Search(testing::RoomCamera(), region, lines, {}, {}, 0).empty());
+  EXPECT_TRUE(search.Search(region, lines, {}, 0).empty()) << "There is no image yet.";
+  search.SetImage(testing::RoomCamera(), segments);
+  EXPECT_TRUE(search.Search(region, {}, {}, 0).empty());
+  EXPECT_FALSE(search.Search(region, lines, {}, 0).empty());
+  search.SetImage(testing::RoomCamera(), {});
+  EXPECT_TRUE(search.Search(region, lines, {}, 0).empty());
   const std::vector<Segment2> points(5, Segment2{{3, 3}, {3, 3}});
-  EXPECT_TRUE(search.Search(testing::RoomCamera(), region, lines, points, {}, 0).empty());
+  search.SetImage(testing::RoomCamera(), points);
+  EXPECT_TRUE(search.Search(region, lines, {}, 0).empty());
 }
 
 TEST(PoseSearch, OneHypothesisIsThePrior) {
@@ -190,8 +199,8 @@ TEST(PoseSearch, OneHypothesisIsThePrior) {
   const auto lines = RoomSearchLines();
   const Rigid3 truth = QueryPose(1);
   const auto segments = testing::Render(testing::RoomLines(), truth, 3);
-  const auto found = search.Search(testing::RoomCamera(), {truth, 0.01, 0.03}, lines, segments,
-                                   {.num_hypotheses = 1}, 0);
+  search.SetImage(testing::RoomCamera(), segments);
+  const auto found = search.Search({truth, 0.01, 0.03}, lines, {.num_hypotheses = 1}, 0);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_LT(DistanceBetween(found[0].cam_from_world, truth).position_m, 0.03);
 }
@@ -219,7 +228,8 @@ TEST(PoseSearch, LargeAndMirroredImagesAreSearchedAlike) {
     };
     scaled.push_back({map(s.start), map(s.end)});
   }
-  const auto found = search.Search(large, {prior, 2.0 * kDegree, 0.1}, lines, scaled, {}, 0);
+  search.SetImage(large, scaled);
+  const auto found = search.Search({prior, 2.0 * kDegree, 0.1}, lines, {}, 0);
   ASSERT_FALSE(found.empty());
   EXPECT_LT(DistanceBetween(found[0].cam_from_world, truth).position_m, 0.03);
 }

@@ -215,6 +215,52 @@ TEST_F(Replay, GravityHasALineForEveryFrame) {
       "bad.txt:1: want");
 }
 
+TEST_F(Replay, TheRightOneOfSeveralPriorsIsRefined) {
+  // The priors that are right stand in the second file, for all frames but the first.
+  std::istringstream lines(ReadAll(Priors()));
+  std::ostringstream wrong, right;
+  int num_right = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream numbers(line);
+    std::string stamp, rest;
+    double x = 0.0;
+    numbers >> stamp >> x;
+    std::getline(numbers, rest);
+    wrong << stamp << ' ' << x + 1.5 << rest << '\n';
+    if (num_right++ > 0) right << line << '\n';
+  }
+  const std::string wrong_file = dir_.Write("wrong.txt", wrong.str());
+  const std::string right_file = dir_.Write("right.txt", right.str());
+  const std::string arguments = ReplayArguments(wrong_file, Map()) + " --overlays 0 ";
+  const ProgramRun run =
+      RunPlumbline(arguments + "--more-priors " + wrong_file + ":8,2 --more-priors " + right_file +
+                   " --out " + (dir_ / "run"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::istringstream frames(ReadAll(dir_ / "run/frames.jsonl"));
+  int index = 0;
+  for (std::string line; std::getline(frames, line); ++index) {
+    const json frame = json::parse(line);
+    EXPECT_EQ(frame["status"] == "REFINED", index > 0) << line;
+    EXPECT_EQ(frame["prior_index"], index > 0 ? 2 : 0) << line;
+  }
+  EXPECT_EQ(index, kNumQueries);
+  const ProgramRun eval =
+      RunPlumbline("eval trajectory --run " + (dir_ / "run") + " --truth " +
+                   (*room_ / "groundtruth.txt") + " --priors " + wrong_file + " --json");
+  ASSERT_EQ(eval.exit_code, 0) << eval.err;
+  EXPECT_LT(json::parse(eval.out)["refined"]["median_cm"].get<double>(), 1.0);
+
+  ExpectFailure(arguments + "--more-priors " + right_file + ":0,2", 64, "--more-priors 0,2");
+  ExpectFailure(arguments + "--more-priors " + (dir_ / "none.txt"), 66, "none.txt");
+  ExpectFailure(arguments + "--method paper --more-priors " + right_file, 64, "one prior only");
+  const std::string other = dir_.Write("other.txt", "12345.0 0 0 0 0 0 0 1\n");
+  ExpectFailure(arguments + "--more-priors " + other, 65, "names none of the 6 query frames");
+  std::string too_many;
+  for (int k = 0; k < 9; ++k) too_many += " --more-priors " + right_file;
+  ExpectFailure(arguments + too_many, 64, "9 files, at most 8");
+}
+
 TEST_F(Replay, MapExportWritesPlyAndObj) {
   for (const auto& [name, begin] : {std::pair("lines.ply", "ply\n"), std::pair("lines.obj", "")}) {
     const ProgramRun run =

@@ -13,6 +13,7 @@
 #include "tools/metrics/trajectory_error.h"
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/json_report.h"
+#include "tools/plumbline/prior_files.h"
 #include "tools/plumbline/refine_queries.h"
 
 namespace plumb::tools {
@@ -79,6 +80,7 @@ Outcome Measure(const BenchRefineOptions& options, const MapIndex& index,
     frame.segments = query.segments;
     frame.points = query.points;
     frame.prior = query.prior;
+    frame.more_priors = query.more_priors;
     frame.search = !is_stream;
     frame.seed = i;
     // The fastest of several equal runs: what other programs do to the clock is not the frame's.
@@ -215,6 +217,7 @@ void AddBenchRefine(CLI::App& bench, PendingRun& pending) {
         for (const char* name : {"--sequence", "--frames", "--priors"}) {
           command.get_option("--map")->needs(command.get_option(name));
         }
+        command.get_option("--more-priors")->needs("--map");
         command
             .add_option("--segments", options.segments,
                         "Segments of the images as `detect --refined --json` prints them, instead "

@@ -20,6 +20,7 @@
 #include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 #include "tools/plumbline/point_front_end.h"
+#include "tools/plumbline/prior_files.h"
 
 namespace plumb::tools {
 namespace {
@@ -142,7 +143,7 @@ class Ablation {
       for (const RefineMethod method : {RefineMethod::kSearch, RefineMethod::kPaper}) {
         std::vector<PointMatch>& matches = points[static_cast<size_t>(method)];
         matches = point_front_end_.MatchQuery(run_->sequence.camera, *run_->index,
-                                              prior.cam_from_world, method);
+                                              {&prior.cam_from_world, 1}, method);
         RectifyPoints(run_->sequence.rectifier, &matches);
       }
     }

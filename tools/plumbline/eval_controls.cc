@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -68,15 +69,21 @@ Outcome DetectAll(FrameRun* run, std::vector<std::vector<Segment2>>* out_segment
   return std::nullopt;
 }
 
-/// The first frame, from half of the run on, whose prior lies elsewhere.
-std::optional<size_t> FrameElsewhere(const std::vector<PosePrior>& priors, size_t index) {
-  const PosePrior& prior = priors[index];
-  for (size_t step = 0; step < priors.size(); ++step) {
-    const size_t other = (index + priors.size() / 2 + step) % priors.size();
-    const PoseDistance distance =
-        DistanceBetween(priors[other].cam_from_world, prior.cam_from_world);
-    if (distance.position_m > kElsewhereDeviations * prior.position_sigma_m ||
-        distance.rotation_rad > kElsewhereDeviations * prior.rotation_sigma_rad) {
+bool IsElsewhere(const Rigid3& cam_from_world, const PosePrior& prior) {
+  const PoseDistance distance = DistanceBetween(cam_from_world, prior.cam_from_world);
+  return distance.position_m > kElsewhereDeviations * prior.position_sigma_m ||
+         distance.rotation_rad > kElsewhereDeviations * prior.rotation_sigma_rad;
+}
+
+/// The first frame, from half of the run on, whose prior is elsewhere than all priors of `index`.
+std::optional<size_t> FrameElsewhere(const FrameRun& run, size_t index) {
+  const std::span<const PosePrior> more = run.MorePriors(index);
+  const size_t count = run.priors.size();
+  for (size_t step = 0; step < count; ++step) {
+    const size_t other = (index + count / 2 + step) % count;
+    const Rigid3& pose = run.priors[other].cam_from_world;
+    const auto is_elsewhere = [&](const PosePrior& prior) { return IsElsewhere(pose, prior); };
+    if (is_elsewhere(run.priors[index]) && std::all_of(more.begin(), more.end(), is_elsewhere)) {
       return other;
     }
   }
@@ -89,7 +96,7 @@ std::optional<std::vector<Segment2>> SegmentsOf(Control control, const FrameRun&
   const Camera& camera = run.sequence.camera;
   switch (control) {
     case kElsewhere: {
-      const auto other = FrameElsewhere(run.priors, index);
+      const auto other = FrameElsewhere(run, index);
       return other ? std::optional(segments[*other]) : std::nullopt;
     }
     case kMirrored:
@@ -119,6 +126,7 @@ Outcome RefineAll(const FrameRun& run, const std::vector<std::vector<Segment2>>&
       input.camera = run.sequence.camera;
       input.segments = *chosen;
       input.prior = run.priors[i];
+      input.more_priors = run.MorePriors(i);
       input.seed = i;
       if (const Status refined = (*refiner)->Refine(input, &result); !refined) {
         return FailureFrom(refined.error());

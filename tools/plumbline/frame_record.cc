@@ -48,6 +48,7 @@ Json DescribeFrame(const FrameResult& result) {
               {"evidence", Rounded(refined.evidence_nats, 3)},
               {"runner_up_ratio", Rounded(refined.runner_up_ratio, 5)},
               {"searched", result.searched},
+              {"prior_index", refined.prior_index},
               {"ms",
                {{"detect", Rounded(Milliseconds(result.times.detect_ns), 3)},
                 {"ridge", Rounded(Milliseconds(result.times.ridge_ns), 3)},

@@ -13,16 +13,14 @@
 #include "tools/datasets/image_file.h"
 #include "tools/datasets/text_file.h"
 #include "tools/datasets/timestamp.h"
-#include "tools/datasets/trajectory.h"
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/point_front_end.h"
+#include "tools/plumbline/prior_files.h"
 
 namespace plumb::tools {
 namespace {
 
-/// A prior within it of a frame's time is that frame's.
-constexpr int64_t kSameFrameNs = 1'000'000;
 constexpr int64_t kWaitNs = 1'000'000'000;
 
 /// Finds nothing: what is left of a run without lines are its points.
@@ -85,6 +83,8 @@ Outcome ReadGravity(const FrameRunOptions& options, FrameRun* run) {
     }
     gravity.down_in_camera = near->second;
     run->priors[i].gravity = gravity;
+    if (run->more_priors.empty()) continue;
+    for (PosePrior& prior : run->more_priors[i]) prior.gravity = gravity;
   }
   return std::nullopt;
 }
@@ -136,53 +136,6 @@ class ResultPump {
 
 }  // namespace
 
-Outcome ParsePoseSize(const std::string& option, const std::string& text, double* out_cm,
-                      double* out_deg) {
-  const std::vector<DataLine> lines = DataLines(text);
-  if (lines.size() == 1 && lines[0].fields.size() == 2) {
-    const Result<double> cm = ParseNumber(lines[0].fields[0]);
-    const Result<double> deg = ParseNumber(lines[0].fields[1]);
-    if (cm && deg && *cm > 0.0 && *deg > 0.0) {
-      *out_cm = *cm;
-      *out_deg = *deg;
-      return std::nullopt;
-    }
-  }
-  return Failure{kExitUsage, option + " " + text + ": want two positive numbers, CM,DEG"};
-}
-
-Outcome ReadPriors(const std::string& path, const std::string& size,
-                   const std::vector<SequenceFrame>& frames, std::vector<PosePrior>* out_priors) {
-  double cm = 0.0, deg = 0.0;
-  if (Outcome failed = ParsePoseSize("--prior-size", size, &cm, &deg)) return failed;
-  PosePrior prior;
-  prior.position_sigma_m = cm / 100.0;
-  prior.rotation_sigma_rad = deg * std::numbers::pi / 180.0;
-  const Result<Trajectory> poses = ReadTumTrajectory(path);
-  if (!poses) return FailureFrom(poses.error());
-  size_t num_missing = 0;
-  int64_t first_missing_ns = 0;
-  for (const SequenceFrame& frame : frames) {
-    const StampedPose* pose = NearestPose(*poses, frame.timestamp_ns, kSameFrameNs);
-    if (pose == nullptr) {
-      if (num_missing++ == 0) first_missing_ns = frame.timestamp_ns;
-      continue;
-    }
-    prior.cam_from_world = pose->cam_from_world;
-    out_priors->push_back(prior);
-  }
-  if (num_missing == frames.size()) {
-    return Failure{kExitBadData,
-                   path + ": names none of the " + std::to_string(num_missing) + " query frames"};
-  }
-  if (num_missing > 0) {
-    return Failure{kExitBadData, path + ": no pose for " + std::to_string(num_missing) +
-                                     " of the " + std::to_string(frames.size()) +
-                                     " frames, the first is " + FormatTimestamp(first_missing_ns)};
-  }
-  return std::nullopt;
-}
-
 void BindRecordingOptions(CLI::App& command, FrameRunOptions& options) {
   command
       .add_option("--sequence", options.sequence, "Sequence in TUM RGB-D layout with camera.json")
@@ -211,6 +164,10 @@ void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
       .add_option("--prior-size", options.prior_size,
                   "How far off the priors may be: norms in centimetres and degrees, CM,DEG")
       ->capture_default_str();
+  command.add_option(
+      "--more-priors", options.more_priors,
+      "FILE or FILE:CM,DEG; one more coarse pose of some query frames, for other places "
+      "where the camera may be, and how far off (else --prior-size); repeatable");
   command
       .add_option("--gravity", options.gravity,
                   "Gravity of an inertial sensor, a line \"timestamp x y z\" per query frame: the "
@@ -236,6 +193,12 @@ void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
       ->capture_default_str();
 }
 
+std::vector<Rigid3> FrameRun::PriorPoses(size_t frame) const {
+  std::vector<Rigid3> poses(1, priors[frame].cam_from_world);
+  for (const PosePrior& prior : MorePriors(frame)) poses.push_back(prior.cam_from_world);
+  return poses;
+}
+
 Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
   Result<TumSequence> sequence = ReadTumSequence(options.sequence);
   if (!sequence) return FailureFrom(sequence.error());
@@ -253,6 +216,15 @@ Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
   if (!options.priors.empty()) {
     if (Outcome failed =
             ReadPriors(options.priors, options.prior_size, out_run->frames, &out_run->priors)) {
+      return failed;
+    }
+  }
+  if (!options.more_priors.empty()) {
+    if (options.method == "paper") {
+      return Failure{kExitUsage, "--more-priors: --method paper takes one prior only"};
+    }
+    if (Outcome failed = ReadMorePriors(options.more_priors, options.prior_size, out_run->frames,
+                                        &out_run->more_priors)) {
       return failed;
     }
   }
@@ -303,15 +275,15 @@ Outcome RunFrames(FrameRun* run, const FrameSink& sink) {
           !found) {
         return FailFrame(frame, found.error());
       }
-      points =
-          point_front_end.MatchQuery(run->sequence.camera, *run->index,
-                                     run->priors[i].cam_from_world, run->session.refiner.method);
+      points = point_front_end.MatchQuery(run->sequence.camera, *run->index, run->PriorPoses(i),
+                                          run->session.refiner.method);
     }
     SessionFrame input;
     input.image = ViewOf(*image);
     input.camera = run->sequence.rectifier.image_camera();
     input.timestamp_ns = frame.timestamp_ns;
     input.prior = run->priors[i];
+    input.more_priors = run->MorePriors(i);
     input.points = points;
     const Result<SubmitOutcome> submitted = session.Submit(input);
     if (!submitted) return FailFrame(frame, submitted.error());

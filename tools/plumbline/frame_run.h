@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct FrameRunOptions {
   std::string sequence, frames, priors, map;
   DetectorOptions detector;
   std::string prior_size = "10,2";        // cm, deg
+  std::vector<std::string> more_priors;   // FILE or FILE:CM,DEG
   std::string gravity, gravity_in_world;  // a file, X,Y,Z; empty: not known
   double gravity_sigma_deg = 1.0;
   std::string mode;               // independent | stream
@@ -39,8 +41,9 @@ void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options);
 /// The input of a run, read and checked completely before the first frame.
 struct FrameRun {
   TumSequence sequence;
-  std::vector<SequenceFrame> frames;  // ascending in time
-  std::vector<PosePrior> priors;      // of the same frames
+  std::vector<SequenceFrame> frames;                // ascending in time
+  std::vector<PosePrior> priors;                    // of the same frames
+  std::vector<std::vector<PosePrior>> more_priors;  // of the same frames; empty: none
   LineMap map;
   std::unique_ptr<MapIndex> index;  // over `map`
   std::unique_ptr<LineDetector> detector;
@@ -48,16 +51,13 @@ struct FrameRun {
   SessionOptions session;
   bool with_points = false;     // SIFT points beside the lines
   std::vector<cv::Mat> images;  // of the frames, decoded beforehand; empty: read on the way
+
+  std::span<const PosePrior> MorePriors(size_t frame) const {
+    return more_priors.empty() ? std::span<const PosePrior>() : more_priors[frame];
+  }
+  /// Poses of all priors of a frame.
+  std::vector<Rigid3> PriorPoses(size_t frame) const;
 };
-
-/// "CM,DEG", the value of `option`, into two positive numbers.
-Outcome ParsePoseSize(const std::string& option, const std::string& text, double* out_cm,
-                      double* out_deg);
-
-/// The prior of every frame, in the frames' order.
-/// @param size  CM,DEG.
-Outcome ReadPriors(const std::string& path, const std::string& size,
-                   const std::vector<SequenceFrame>& frames, std::vector<PosePrior>* out_priors);
 
 /// Reads everything that `options` name. Every frame needs an image, and a prior if priors are
 /// named.

@@ -17,13 +17,13 @@
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/detector_choice.h"
-#include "tools/plumbline/frame_run.h"
 #include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 #include "tools/plumbline/key_frame_source.h"
 #include "tools/plumbline/output_directory.h"
 #include "tools/plumbline/point_front_end.h"
 #include "tools/plumbline/posed_frames.h"
+#include "tools/plumbline/prior_files.h"
 
 namespace plumb::tools {
 namespace {

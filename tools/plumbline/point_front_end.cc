@@ -53,9 +53,9 @@ Status PointFrontEnd::ExtractQuery(const cv::Mat& image, const Rectifier& rectif
 }
 
 std::vector<PointMatch> PointFrontEnd::MatchQuery(const Camera& ideal, const MapIndex& index,
-                                                  const Rigid3& prior_cam_from_world,
+                                                  std::span<const Rigid3> priors_cam_from_world,
                                                   RefineMethod method) {
-  matcher_.Match(points_, index, prior_cam_from_world, &correspondences_);
+  matcher_.Match(points_, index, priors_cam_from_world, &correspondences_);
   std::vector<PointMatch> matches;
   const auto add = [&](const PointCorrespondence& c) {
     matches.push_back(

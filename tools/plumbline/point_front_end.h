@@ -1,6 +1,7 @@
 // SIFT points of recorded images, for maps and for queries (--points opencv).
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -27,11 +28,12 @@ class PointFrontEnd {
   /// Finds the points of a query image, for any number of MatchQuery().
   Status ExtractQuery(const cv::Mat& image, const Rectifier& rectifier);
 
-  /// 2D-3D matches of the query image with the key frames near its prior: all of them for the
+  /// 2D-3D matches of the query image with the key frames near its priors: all of them for the
   /// search, which drops those that do not fit the lines' pose, else the inliers of PnP-RANSAC.
   /// Pixels are those of the image.
   std::vector<PointMatch> MatchQuery(const Camera& ideal, const MapIndex& index,
-                                     const Rigid3& prior_cam_from_world, RefineMethod method);
+                                     std::span<const Rigid3> priors_cam_from_world,
+                                     RefineMethod method);
 
  private:
   Status Extract(const cv::Mat& image);

@@ -59,6 +59,7 @@ Outcome ReadQueries(FrameRun* run, const std::string& segments_path, size_t limi
     const SequenceFrame& frame = run->frames[i];
     RefineQuery& query = out_queries->queries.emplace_back();
     query.prior = run->priors[i];
+    query.more_priors.assign(run->MorePriors(i).begin(), run->MorePriors(i).end());
     query.true_cam_from_world = frame.cam_from_world;
     if (segments_path.empty() || run->with_points) {
       const Result<cv::Mat> image = ReadColorImage(frame.color_path);
@@ -74,8 +75,8 @@ Outcome ReadQueries(FrameRun* run, const std::string& segments_path, size_t limi
             !extracted) {
           return FailureFrom(extracted.error());
         }
-        query.points = points.MatchQuery(run->sequence.camera, *run->index,
-                                         query.prior.cam_from_world, run->session.refiner.method);
+        query.points = points.MatchQuery(run->sequence.camera, *run->index, run->PriorPoses(i),
+                                         run->session.refiner.method);
         RectifyPoints(run->sequence.rectifier, &query.points);
       }
     }

@@ -16,6 +16,7 @@ struct RefineQuery {
   std::vector<Segment2> segments;
   std::vector<PointMatch> points;
   PosePrior prior;
+  std::vector<PosePrior> more_priors;
   std::optional<Rigid3> true_cam_from_world;
 };
 

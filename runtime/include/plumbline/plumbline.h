@@ -259,6 +259,20 @@ enum {
   PLUMB_UNCERTAINTY_COVARIANCE = 1 /* prior_covariance */
 };
 
+/* One more place where the camera may be. In an array, struct_size is the distance from one to the
+ * next, and the same in all. */
+typedef struct plumb_pose_prior {
+  uint32_t struct_size;
+  int32_t uncertainty; /* PLUMB_UNCERTAINTY_* */
+  double q_xyzw[4];    /* in the frame's pose_convention, as all of it */
+  double t_m[3];
+  double position_sigma_m, rotation_sigma_rad; /* as prior_position_sigma_m of plumb_frame */
+  double covariance[36];                       /* as prior_covariance */
+} plumb_pose_prior;
+
+/* plumb_frame.num_more_priors at most. */
+#define PLUMB_MAX_MORE_PRIORS 8
+
 /* Covariances, here and in results, are row-major 6 x 6 of (rotation w [rad], translation v [m]) in
  * CV camera axes, whatever the pose convention: a camera point moves to exp(w) x + v. */
 typedef struct plumb_frame {
@@ -301,6 +315,15 @@ typedef struct plumb_frame {
   double gravity_in_camera[3];
   double gravity_in_world[3];
   double gravity_sigma_rad;
+  /* Beside the prior, other places where the camera may be: hits of a retrieval or a relocaliser, a
+   * satellite fix beside a tracked pose. Each is searched as the prior is, and the time grows with
+   * their number. The place that the lines speak for is refined (`prior_index` of the result);
+   * when they speak for several the status is AMBIGUOUS. Whatever is not REFINED keeps the prior
+   * above. In stream mode they are tried when the stream has to be searched for. Gravity serves all
+   * of them. Not with PLUMB_METHOD_PAPER. */
+  const plumb_pose_prior* more_priors;
+  uint32_t num_more_priors; /* up to PLUMB_MAX_MORE_PRIORS */
+  uint32_t reserved_priors; /* 0 */
 } plumb_frame;
 
 /* Every accepted frame gives exactly one result, in the order of submission.
@@ -347,12 +370,16 @@ typedef struct plumb_frame_result {
   double t_m[3];
   double covariance[36];            /* see plumb_frame */
   double map_support;               /* share of the visible map that was found, 0..1 */
-  double runner_up_ratio;           /* support of the best clearly different pose over this one's */
+  double runner_up_ratio;           /* support of the best clearly different pose over this one's;
+                                       of other priors' poses their evidence */
   uint32_t num_observed_directions; /* of the pose's six, by lines and points */
   uint32_t num_segments, num_matches, num_points_used;
   int64_t wait_ns, detect_ns, ridge_ns, search_ns, refine_ns; /* stages */
   int64_t total_ns;                                           /* from submission to this result */
   char error_message[128]; /* cut if longer; "" unless PLUMB_OUTCOME_FAILED */
+  uint32_t prior_index;    /* that a REFINED pose was found from: 0 the frame's prior, k its
+                              more_priors[k - 1] */
+  uint32_t reserved;       /* 0 */
 } plumb_frame_result;
 
 /* Takes the oldest result. OK or NOT_READY. */

@@ -5,7 +5,6 @@
 #include <memory>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "abi/conversion.h"
 #include "abi/detector.h"
@@ -60,7 +59,7 @@ plumb_result NullArgument(const char* name) {
 
 // One for each thread, so that neither polling nor submitting allocates once they have grown.
 thread_local plumb::FrameResult polled_result;
-thread_local std::vector<plumb::PointMatch> submitted_points;
+thread_local plumb::abi::FrameLists submitted_lists;
 
 }  // namespace
 
@@ -225,8 +224,7 @@ plumb_result plumb_session_submit_frame(plumb_session* session, const plumb_fram
     if (session == nullptr) return NullArgument("session");
     const Result<plumb_frame> read = ReadStruct(frame, kFrameSizeV1, "plumb_frame");
     if (!read) return Fail(read.error());
-    const Result<plumb::SessionFrame> converted =
-        plumb::abi::FrameFromAbi(*read, &submitted_points);
+    const Result<plumb::SessionFrame> converted = plumb::abi::FrameFromAbi(*read, &submitted_lists);
     if (!converted) return Fail(converted.error());
     const Result<plumb::SubmitOutcome> outcome = session->impl->Submit(*converted);
     if (!outcome) return Fail(outcome.error());

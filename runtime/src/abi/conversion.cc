@@ -2,17 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
+#include <optional>
 #include <string>
 
 #include <Eigen/Eigenvalues>
 
 #include "abi/guard.h"
+#include "abi/versioned_struct.h"
 
 namespace plumb::abi {
 namespace {
 
 constexpr double kMaxQuaternionError = 1e-3;
+
+// Of the struct's first version; never changes.
+constexpr size_t kPosePriorSizeV1 =
+    offsetof(plumb_pose_prior, covariance) + sizeof(plumb_pose_prior::covariance);
+
+static_assert(PLUMB_MAX_MORE_PRIORS == kMaxMorePriors);
 
 Error Invalid(const std::string& message) { return {ErrorCode::kInvalidArgument, message}; }
 
@@ -81,39 +90,83 @@ Result<Lens> LensFromAbi(const plumb_frame& frame) {
   return lens;
 }
 
-Result<PosePrior> PriorFromAbi(const plumb_frame& frame) {
+// Messages begin with the member.
+Result<PosePrior> PriorFromAbi(int32_t convention, const plumb_pose_prior& from) {
   PosePrior prior;
-  Result<Rigid3> pose = PoseFromAbi(frame.pose_convention, frame.prior_q_xyzw, frame.prior_t_m);
+  const Result<Rigid3> pose = PoseFromAbi(convention, from.q_xyzw, from.t_m);
   if (!pose) return pose.error();
   prior.cam_from_world = *pose;
-  switch (frame.prior_uncertainty) {
+  switch (from.uncertainty) {
     case PLUMB_UNCERTAINTY_SIZES:
       // Zero keeps the default; the session refuses what is negative or not finite.
-      if (frame.prior_position_sigma_m != 0.0) {
-        prior.position_sigma_m = frame.prior_position_sigma_m;
-      }
-      if (frame.prior_rotation_sigma_rad != 0.0) {
-        prior.rotation_sigma_rad = frame.prior_rotation_sigma_rad;
-      }
-      break;
+      if (from.position_sigma_m != 0.0) prior.position_sigma_m = from.position_sigma_m;
+      if (from.rotation_sigma_rad != 0.0) prior.rotation_sigma_rad = from.rotation_sigma_rad;
+      return prior;
     case PLUMB_UNCERTAINTY_COVARIANCE:
-      if (const Status read = SizesOfCovariance(frame.prior_covariance, &prior); !read) {
+      if (const Status read = SizesOfCovariance(from.covariance, &prior); !read) {
         return read.error();
       }
-      break;
+      return prior;
     default:
-      return Invalid("frame.prior_uncertainty " + std::to_string(frame.prior_uncertainty) +
+      return Invalid("uncertainty " + std::to_string(from.uncertainty) +
                      " is not a PLUMB_UNCERTAINTY");
   }
-  const Eigen::Map<const Eigen::Vector3d> down(frame.gravity_in_camera);
-  if (!down.isZero(0.0)) {
-    GravityPrior& gravity = prior.gravity.emplace();
-    gravity.down_in_camera = down;
-    if (IsGl(frame.pose_convention)) gravity.down_in_camera = GlFromCv() * gravity.down_in_camera;
-    gravity.down_in_world = Eigen::Map<const Eigen::Vector3d>(frame.gravity_in_world);
-    if (frame.gravity_sigma_rad != 0.0) gravity.sigma_rad = frame.gravity_sigma_rad;
-  }
+}
+
+Result<PosePrior> FirstPriorFromAbi(const plumb_frame& frame) {
+  plumb_pose_prior from{};
+  from.uncertainty = frame.prior_uncertainty;
+  std::copy_n(frame.prior_q_xyzw, 4, from.q_xyzw);
+  std::copy_n(frame.prior_t_m, 3, from.t_m);
+  from.position_sigma_m = frame.prior_position_sigma_m;
+  from.rotation_sigma_rad = frame.prior_rotation_sigma_rad;
+  std::copy_n(frame.prior_covariance, 36, from.covariance);
+  Result<PosePrior> prior = PriorFromAbi(frame.pose_convention, from);
+  if (!prior) return Invalid("frame.prior_" + prior.error().message);
   return prior;
+}
+
+std::optional<GravityPrior> GravityFromAbi(const plumb_frame& frame) {
+  const Eigen::Map<const Eigen::Vector3d> down(frame.gravity_in_camera);
+  if (down.isZero(0.0)) return std::nullopt;
+  GravityPrior gravity;
+  gravity.down_in_camera = down;
+  if (IsGl(frame.pose_convention)) gravity.down_in_camera = GlFromCv() * gravity.down_in_camera;
+  gravity.down_in_world = Eigen::Map<const Eigen::Vector3d>(frame.gravity_in_world);
+  if (frame.gravity_sigma_rad != 0.0) gravity.sigma_rad = frame.gravity_sigma_rad;
+  return gravity;
+}
+
+Status MorePriorsFromAbi(const plumb_frame& frame, std::vector<PosePrior>* out_priors) {
+  out_priors->clear();
+  if (frame.reserved_priors != 0) return Invalid("frame.reserved_priors is not zero");
+  if (frame.num_more_priors == 0) return Ok();
+  if (frame.num_more_priors > PLUMB_MAX_MORE_PRIORS) {
+    return Invalid("frame.num_more_priors " + std::to_string(frame.num_more_priors) + " is above " +
+                   std::to_string(PLUMB_MAX_MORE_PRIORS));
+  }
+  if (frame.more_priors == nullptr) return Invalid("frame.more_priors is NULL");
+  const auto* bytes = reinterpret_cast<const unsigned char*>(frame.more_priors);
+  const uint32_t stride = frame.more_priors->struct_size;
+  for (uint32_t i = 0; i < frame.num_more_priors; ++i) {
+    const auto* entry =
+        reinterpret_cast<const plumb_pose_prior*>(bytes + static_cast<size_t>(i) * stride);
+    const auto wrong = [i](const Error& error, const char* between) -> Status {
+      return Error{error.code,
+                   "frame.more_priors[" + std::to_string(i) + "]" + between + error.message};
+    };
+    const Result<plumb_pose_prior> read = ReadStruct(entry, kPosePriorSizeV1, "plumb_pose_prior");
+    if (!read) return wrong(read.error(), ": ");
+    if (read->struct_size != stride) {
+      return Invalid("frame.more_priors[" + std::to_string(i) + "].struct_size " +
+                     std::to_string(read->struct_size) + " is not the first one's " +
+                     std::to_string(stride));
+    }
+    const Result<PosePrior> prior = PriorFromAbi(frame.pose_convention, *read);
+    if (!prior) return wrong(prior.error(), ".");
+    out_priors->push_back(*prior);
+  }
+  return Ok();
 }
 
 int32_t StatusToAbi(RefineStatus status) {
@@ -149,16 +202,12 @@ int32_t OutcomeToAbi(FrameOutcome outcome) {
 }  // namespace
 
 Result<Rigid3> PoseFromAbi(int32_t convention, const double q_xyzw[4], const double t_m[3]) {
-  if (convention < PLUMB_POSE_CV_CAM_FROM_WORLD || convention > PLUMB_POSE_GL_WORLD_FROM_CAM) {
-    return Invalid("frame.pose_convention " + std::to_string(convention) +
-                   " is not a PLUMB_POSE convention");
-  }
   Rigid3 pose{Eigen::Quaterniond(q_xyzw[3], q_xyzw[0], q_xyzw[1], q_xyzw[2]),
               Eigen::Vector3d(t_m[0], t_m[1], t_m[2])};
-  if (!pose.IsFinite()) return Invalid("frame.prior_q_xyzw or frame.prior_t_m is not finite");
+  if (!pose.IsFinite()) return Invalid("q_xyzw or t_m is not finite");
   const double norm = pose.rotation.norm();
   if (!(std::abs(norm - 1.0) < kMaxQuaternionError)) {
-    return Invalid("frame.prior_q_xyzw has norm " + std::to_string(norm) + ", not 1");
+    return Invalid("q_xyzw has norm " + std::to_string(norm) + ", not 1");
   }
   pose.rotation.normalize();
   if (IsWorldFromCam(convention)) pose = pose.Inverse();
@@ -176,26 +225,26 @@ Status SizesOfCovariance(const double covariance[36], PosePrior* out_prior) {
   constexpr double kRelativeTolerance = 1e-6;
   const Matrix6d matrix =
       Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(covariance);
-  if (!matrix.allFinite()) return Invalid("frame.prior_covariance is not finite");
+  if (!matrix.allFinite()) return Invalid("covariance is not finite");
   const double tolerance = kRelativeTolerance * matrix.cwiseAbs().maxCoeff();
   if ((matrix - matrix.transpose()).cwiseAbs().maxCoeff() > tolerance) {
-    return Invalid("frame.prior_covariance is not symmetric");
+    return Invalid("covariance is not symmetric");
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix, Eigen::EigenvaluesOnly);
   if (solver.eigenvalues().minCoeff() < -tolerance) {
-    return Invalid("frame.prior_covariance is not positive semi-definite");
+    return Invalid("covariance is not positive semi-definite");
   }
   const double rotation = matrix.topLeftCorner<3, 3>().trace();
   const double position = matrix.bottomRightCorner<3, 3>().trace();
   if (!(rotation > 0.0 && position > 0.0)) {
-    return Invalid("frame.prior_covariance leaves no uncertainty in rotation or position");
+    return Invalid("covariance leaves no uncertainty in rotation or position");
   }
   out_prior->rotation_sigma_rad = std::sqrt(rotation);
   out_prior->position_sigma_m = std::sqrt(position);
   return Ok();
 }
 
-Result<SessionFrame> FrameFromAbi(const plumb_frame& frame, std::vector<PointMatch>* points) {
+Result<SessionFrame> FrameFromAbi(const plumb_frame& frame, FrameLists* lists) {
   constexpr uint32_t kMaxSidePx = 16384, kMaxPoints = 1u << 20;
   SessionFrame out;
   if (frame.reserved != 0) return Invalid("frame.reserved is not zero");
@@ -219,9 +268,20 @@ Result<SessionFrame> FrameFromAbi(const plumb_frame& frame, std::vector<PointMat
   out.timestamp_ns = frame.timestamp_ns;
   out.user_tag = frame.user_tag;
   out.user_kind = static_cast<uint32_t>(frame.pose_convention);
-  const Result<PosePrior> prior = PriorFromAbi(frame);
+  if (frame.pose_convention < PLUMB_POSE_CV_CAM_FROM_WORLD ||
+      frame.pose_convention > PLUMB_POSE_GL_WORLD_FROM_CAM) {
+    return Invalid("frame.pose_convention " + std::to_string(frame.pose_convention) +
+                   " is not a PLUMB_POSE convention");
+  }
+  const Result<PosePrior> prior = FirstPriorFromAbi(frame);
   if (!prior) return prior.error();
   out.prior = *prior;
+  out.prior.gravity = GravityFromAbi(frame);
+  if (const Status read = MorePriorsFromAbi(frame, &lists->more_priors); !read) {
+    return read.error();
+  }
+  for (PosePrior& more : lists->more_priors) more.gravity = out.prior.gravity;
+  out.more_priors = lists->more_priors;
 
   if (frame.num_points > kMaxPoints) {
     return Invalid("frame.num_points " + std::to_string(frame.num_points) + " is above 2^20");
@@ -229,9 +289,9 @@ Result<SessionFrame> FrameFromAbi(const plumb_frame& frame, std::vector<PointMat
   if (frame.num_points > 0 && (frame.points_px == nullptr || frame.points_in_world_m == nullptr)) {
     return Invalid("frame.points_px or frame.points_in_world_m is NULL");
   }
-  points->resize(frame.num_points);
+  lists->points.resize(frame.num_points);
   for (size_t i = 0; i < frame.num_points; ++i) {
-    PointMatch& point = (*points)[i];
+    PointMatch& point = lists->points[i];
     point.pixel = Eigen::Map<const Eigen::Vector2d>(frame.points_px + 2 * i);
     point.point_in_world = Eigen::Map<const Eigen::Vector3d>(frame.points_in_world_m + 3 * i);
     point.deviation_in_world.setZero();
@@ -240,7 +300,7 @@ Result<SessionFrame> FrameFromAbi(const plumb_frame& frame, std::vector<PointMat
           Eigen::Map<const Eigen::Vector3d>(frame.points_deviation_m + 3 * i);
     }
   }
-  out.points = *points;
+  out.points = lists->points;
   out.release = frame.release;
   out.release_user = frame.release_user;
   return out;
@@ -270,6 +330,7 @@ plumb_frame_result ResultToAbi(const FrameResult& result) {
   out.num_segments = static_cast<uint32_t>(result.segments.size());
   out.num_matches = static_cast<uint32_t>(result.refined.matches.size());
   out.num_points_used = result.refined.num_points_used;
+  out.prior_index = result.refined.prior_index;
   out.wait_ns = result.times.wait_ns;
   out.detect_ns = result.times.detect_ns;
   out.ridge_ns = result.times.ridge_ns;

@@ -1,5 +1,7 @@
 #include "plumb/points/point_matcher.h"
 
+#include <algorithm>
+
 namespace plumb {
 namespace {
 
@@ -8,13 +10,21 @@ constexpr size_t kMinPoints = 5;  // below, the ratio test says nothing
 }  // namespace
 
 void PointMatcher::Match(const ImagePoints& points, const MapIndex& index,
-                         const Rigid3& prior_cam_from_world,
+                         std::span<const Rigid3> priors_cam_from_world,
                          std::vector<PointCorrespondence>* out_matches) {
   out_matches->clear();
   if (points.size() < kMinPoints) return;
   image_table_.Clear();
   for (const PointDescriptor& descriptor : points.descriptors) image_table_.Add(descriptor);
-  index.NearestKeyFrames(prior_cam_from_world, options_.num_key_frames, &key_frames_);
+  key_frames_.clear();
+  for (const Rigid3& prior : priors_cam_from_world) {
+    index.NearestKeyFrames(prior, options_.num_key_frames, &nearest_);
+    for (const uint32_t k : nearest_) {
+      if (std::find(key_frames_.begin(), key_frames_.end(), k) == key_frames_.end()) {
+        key_frames_.push_back(k);
+      }
+    }
+  }
   for (const uint32_t k : key_frames_) {
     const KeyFrame& key_frame = index.map().key_frames[k];
     if (key_frame.points.size() < kMinPoints) continue;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -15,7 +16,7 @@
 namespace plumb {
 
 struct PointMatcherOptions {
-  uint32_t num_key_frames = 10;  // nearest to the prior
+  uint32_t num_key_frames = 10;  // nearest to a prior
   double max_ratio = 0.8;        // of the distances to the nearest and second nearest descriptor
   DepthNoise depth_noise;
   /// On the depth deviation: the depth errors of a key frame's points are common to many of them.
@@ -38,19 +39,20 @@ class PointMatcher {
  public:
   explicit PointMatcher(const PointMatcherOptions& options = {}) : options_(options) {}
 
-  /// Matches against each of the key frames nearest to the prior on its own (ratio and mutual), so
-  /// that an image point may appear once for each. All matches are returned: whoever has a better
-  /// pose than the prior drops those that do not fit it. Ordered by key frame, nearest first, then
-  /// by image point.
+  /// Matches against each of the key frames nearest to one of the priors on its own (ratio and
+  /// mutual), so that an image point may appear once for each. All matches are returned: whoever
+  /// has a better pose than the prior drops those that do not fit it. Ordered by prior, then by key
+  /// frame, nearest first, then by image point; no key frame twice.
   /// Source: docs/method/association.md 2.11.
-  void Match(const ImagePoints& points, const MapIndex& index, const Rigid3& prior_cam_from_world,
+  void Match(const ImagePoints& points, const MapIndex& index,
+             std::span<const Rigid3> priors_cam_from_world,
              std::vector<PointCorrespondence>* out_matches);
 
  private:
   PointMatcherOptions options_;
   DescriptorMatcher matcher_;
   DescriptorTable image_table_, map_table_;
-  std::vector<uint32_t> key_frames_;
+  std::vector<uint32_t> key_frames_, nearest_;
   std::vector<DescriptorPair> pairs_;
 };
 

@@ -70,13 +70,7 @@ size_t ShareOf(size_t count, const PoseSearchOptions& options) {
 
 }  // namespace
 
-std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const SearchRegion& region,
-                                              std::span<const SearchLine> lines,
-                                              std::span<const Segment2> segments,
-                                              const PoseSearchOptions& options, uint64_t seed) {
-  found_.clear();
-  times_ = {};
-  Stopwatch watch;
+void PoseSearch::SetImage(const Camera& camera, std::span<const Segment2> segments) {
   const double scale = camera.width_px > kMaxSearchWidthPx
                            ? static_cast<double>(kReducedWidthPx) / camera.width_px
                            : 1.0;
@@ -91,13 +85,20 @@ std::span<const FoundPose> PoseSearch::Search(const Camera& camera, const Search
                             ? Segment2{reduce(segment.start), reduce(segment.end), segment.score}
                             : segment);
   }
+  if (!segments_.empty()) field_.Assign(camera_.width_px, camera_.height_px, segments_, kField);
+}
+
+std::span<const FoundPose> PoseSearch::Search(const SearchRegion& region,
+                                              std::span<const SearchLine> lines,
+                                              const PoseSearchOptions& options, uint64_t seed) {
+  found_.clear();
+  times_ = {};
+  Stopwatch watch;
   SampleLines(camera_, region.cam_from_world, lines, &samples_);
   if (samples_.count == 0 || segments_.empty()) return found_;
 
   DrawHypotheses(region, lines, options, seed);
   times_.draw_ns = watch.Lap();
-  field_.Assign(camera_.width_px, camera_.height_px, segments_, kField);
-  times_.field_ns = watch.Lap();
   RankAllInTwoPasses(options);
   // The prior itself always takes part.
   const size_t kept = std::min(options.num_aligned, hypotheses_.size());

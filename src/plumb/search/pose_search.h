@@ -44,7 +44,6 @@ struct PoseSearchOptions {
 /// Where the time of a search went [ns].
 struct PoseSearchTimes {
   int64_t draw_ns = 0;   // samples, hypotheses, rotations first
-  int64_t field_ns = 0;  // distance fields
   int64_t score_ns = 0;  // of all hypotheses
   int64_t align_ns = 0;
 };
@@ -64,11 +63,13 @@ struct FoundPose {
 /// Source: docs/method/association.md.
 class PoseSearch {
  public:
+  /// Chooses the image of the searches to come, and makes its distance field.
+  void SetImage(const Camera& camera, std::span<const Segment2> segments);
+
+  /// Searches the image that was set.
   /// @return up to num_survivors poses, best first, any two more than 2 cm or 0.01 rad apart; valid
   ///         until the next call. Empty without lines or segments.
-  std::span<const FoundPose> Search(const Camera& camera, const SearchRegion& region,
-                                    std::span<const SearchLine> lines,
-                                    std::span<const Segment2> segments,
+  std::span<const FoundPose> Search(const SearchRegion& region, std::span<const SearchLine> lines,
                                     const PoseSearchOptions& options, uint64_t seed);
 
   /// Of the last search.

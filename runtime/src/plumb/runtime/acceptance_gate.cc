@@ -52,6 +52,10 @@ int CountObservedDirections(const Matrix6d& information, const PosePrior& prior)
   return Observe(information / kMinGain, prior_information).num_observed;
 }
 
+bool IsAmbiguous(double runner_up_ratio, double evidence_nats) {
+  return runner_up_ratio > (evidence_nats < kWeakNats ? kWeakRunnerUpRatio : kMaxRunnerUpRatio);
+}
+
 RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options) {
   // Written so that NaN never refines.
   if (!(evidence.evidence_nats >= options.min_evidence_nats) ||
@@ -64,9 +68,7 @@ RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options) {
   if (!(evidence.refined.Value() >= options.min_gain * evidence.prior.Value())) {
     return RefineStatus::kKeptPrior;
   }
-  const double max_ratio =
-      evidence.evidence_nats < kWeakNats ? kWeakRunnerUpRatio : kMaxRunnerUpRatio;
-  if (evidence.runner_up_ratio > max_ratio || !evidence.is_near_prior) {
+  if (IsAmbiguous(evidence.runner_up_ratio, evidence.evidence_nats) || !evidence.is_near_prior) {
     return RefineStatus::kAmbiguous;
   }
   return RefineStatus::kRefined;

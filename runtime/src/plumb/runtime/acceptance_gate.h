@@ -58,6 +58,10 @@ bool IsPlausible(const Rigid3& cam_from_world, const PosePrior& prior);
 /// @param information  Scaled to the residuals' real size.
 int CountObservedDirections(const Matrix6d& information, const PosePrior& prior);
 
+/// Whether a clearly different pose that has this share of a pose's support leaves open which of
+/// both it is: 0.97, and kWeakRunnerUpRatio when the pose is weak.
+bool IsAmbiguous(double runner_up_ratio, double evidence_nats);
+
 /// @return kRefined unless a rule of docs/method/association.md ("Status") speaks against it.
 RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options);
 

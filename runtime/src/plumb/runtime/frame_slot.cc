@@ -36,6 +36,31 @@ void CopyImage(const ImageView& from, std::vector<uint8_t>* pixels, ImageView* i
   }
 }
 
+Status Invalid(const std::string& message) {
+  return Error{ErrorCode::kInvalidArgument, "SessionFrame: " + message};
+}
+
+// `name` of the prior for messages.
+Status ValidatePrior(const PosePrior& prior, const std::string& name) {
+  constexpr double kMaxQuaternionError = 1e-3;
+  const Rigid3& pose = prior.cam_from_world;
+  if (!pose.IsFinite()) return Invalid(name + ".cam_from_world is not finite");
+  if (!(std::abs(pose.rotation.norm() - 1.0) < kMaxQuaternionError)) {
+    return Invalid(name + ".cam_from_world.rotation has norm " +
+                   std::to_string(pose.rotation.norm()) + ", not 1");
+  }
+  const auto is_positive = [](double x) { return std::isfinite(x) && x > 0.0; };
+  if (!is_positive(prior.position_sigma_m)) {
+    return Invalid(name + ".position_sigma_m " + std::to_string(prior.position_sigma_m) +
+                   " is not positive");
+  }
+  if (!is_positive(prior.rotation_sigma_rad)) {
+    return Invalid(name + ".rotation_sigma_rad " + std::to_string(prior.rotation_sigma_rad) +
+                   " is not positive");
+  }
+  return prior.gravity ? CheckGravity(*prior.gravity) : Ok();
+}
+
 }  // namespace
 
 void FrameSlot::Assign(const SessionFrame& frame, const Rectifier& frame_rectifier,
@@ -46,6 +71,8 @@ void FrameSlot::Assign(const SessionFrame& frame, const Rectifier& frame_rectifi
   ticket.prior = frame.prior;
   ticket.prior.cam_from_world.rotation.normalize();
   ticket.submitted_ns = now_ns;
+  more_priors.assign(frame.more_priors.begin(), frame.more_priors.end());
+  for (PosePrior& prior : more_priors) prior.cam_from_world.rotation.normalize();
   rectifier = frame_rectifier;
   points.assign(frame.points.begin(), frame.points.end());
   RectifyPoints(rectifier, &points);
@@ -65,42 +92,29 @@ void FrameSlot::ReleaseImage() {
 }
 
 Status ValidateFrame(const SessionFrame& frame) {
-  const auto invalid = [](const std::string& message) -> Status {
-    return Error{ErrorCode::kInvalidArgument, "SessionFrame: " + message};
-  };
-  constexpr double kMaxQuaternionError = 1e-3;
   if (const Status valid = frame.image.Validate(); !valid) return valid;
   const Camera& camera = frame.camera.pinhole;
-  if (!camera.IsValid()) return invalid("camera is not a finite pinhole camera");
+  if (!camera.IsValid()) return Invalid("camera is not a finite pinhole camera");
   if (camera.width_px != frame.image.width_px || camera.height_px != frame.image.height_px) {
-    return invalid("camera is for " + std::to_string(camera.width_px) + " x " +
+    return Invalid("camera is for " + std::to_string(camera.width_px) + " x " +
                    std::to_string(camera.height_px) + " px, the image has " +
                    std::to_string(frame.image.width_px) + " x " +
                    std::to_string(frame.image.height_px));
   }
-  const Rigid3& pose = frame.prior.cam_from_world;
-  if (!pose.IsFinite()) return invalid("prior.cam_from_world is not finite");
-  if (!(std::abs(pose.rotation.norm() - 1.0) < kMaxQuaternionError)) {
-    return invalid("prior.cam_from_world.rotation has norm " +
-                   std::to_string(pose.rotation.norm()) + ", not 1");
+  if (const Status valid = ValidatePrior(frame.prior, "prior"); !valid) return valid;
+  if (frame.more_priors.size() > kMaxMorePriors) {
+    return Invalid("more_priors has " + std::to_string(frame.more_priors.size()) +
+                   " entries, more than " + std::to_string(kMaxMorePriors));
   }
-  const auto is_positive = [](double x) { return std::isfinite(x) && x > 0.0; };
-  if (!is_positive(frame.prior.position_sigma_m)) {
-    return invalid("prior.position_sigma_m " + std::to_string(frame.prior.position_sigma_m) +
-                   " is not positive");
-  }
-  if (!is_positive(frame.prior.rotation_sigma_rad)) {
-    return invalid("prior.rotation_sigma_rad " + std::to_string(frame.prior.rotation_sigma_rad) +
-                   " is not positive");
-  }
-  if (frame.prior.gravity) {
-    if (const Status valid = CheckGravity(*frame.prior.gravity); !valid) return valid;
+  for (size_t i = 0; i < frame.more_priors.size(); ++i) {
+    const std::string name = "more_priors[" + std::to_string(i) + "]";
+    if (const Status valid = ValidatePrior(frame.more_priors[i], name); !valid) return valid;
   }
   for (size_t i = 0; i < frame.points.size(); ++i) {
     const PointMatch& point = frame.points[i];
     if (!point.pixel.allFinite() || !point.point_in_world.allFinite() ||
         !point.deviation_in_world.allFinite()) {
-      return invalid("points[" + std::to_string(i) + "] is not finite");
+      return Invalid("points[" + std::to_string(i) + "] is not finite");
     }
   }
   return Ok();

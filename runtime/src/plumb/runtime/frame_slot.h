@@ -27,6 +27,7 @@ struct FrameTicket {
 /// Slots are recycled: their vectors keep their capacity.
 struct FrameSlot {
   FrameTicket ticket;
+  std::vector<PosePrior> more_priors;
   Rectifier rectifier;             // of the frame's camera
   std::vector<PointMatch> points;  // in pixels of its ideal image
   ImageView image;                 // of `pixels`, or the host's own planes until they are released

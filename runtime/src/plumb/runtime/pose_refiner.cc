@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "plumb/refine/uncertainty.h"
 #include "plumb/runtime/gravity.h"
@@ -48,6 +49,7 @@ Status PoseRefinerOptions::Validate() const {
 struct PoseRefiner::Impl {
   std::optional<SearchMethod> search;
   std::optional<PaperMethod> paper;
+  std::vector<PosePrior> more_priors;  // of a frame, with gravity
 };
 
 PoseRefiner::PoseRefiner(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -67,6 +69,11 @@ Result<std::unique_ptr<PoseRefiner>> PoseRefiner::Create(const MapIndex& index,
 
 Status PoseRefiner::Refine(const RefineInput& input, RefineResult* out_result) {
   if (Status status = CheckRefineInput(input); !status) return status;
+  if (impl_->paper && !input.more_priors.empty()) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "more_priors has " + std::to_string(input.more_priors.size()) +
+                     " entries, the paper's method takes one prior only"};
+  }
   const auto start = std::chrono::steady_clock::now();
   // Starts from the answer "the prior is kept"; the matches keep their capacity.
   std::vector<LineMatch> matches = std::move(out_result->matches);
@@ -78,6 +85,11 @@ Status PoseRefiner::Refine(const RefineInput& input, RefineResult* out_result) {
       PriorCovariance(input.prior.rotation_sigma_rad, input.prior.position_sigma_m);
   RefineInput fused = input;
   fused.prior = FuseGravity(input.prior);
+  impl_->more_priors.clear();
+  for (const PosePrior& prior : input.more_priors) {
+    impl_->more_priors.push_back(FuseGravity(prior));
+  }
+  fused.more_priors = impl_->more_priors;
   if (impl_->search) {
     impl_->search->Refine(fused, out_result);
   } else {

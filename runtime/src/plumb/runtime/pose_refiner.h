@@ -24,7 +24,7 @@ enum class RefineStatus {
   kRefined,
   kKeptPrior,   // the best pose found does not explain the lines better than the prior does
   kAmbiguous,   // a clearly different pose explains the lines as well, or the best one contradicts
-                // the prior by 3 deviations and more
+                // its prior by 3 deviations and more
   kDegenerate,  // the matched lines leave a direction of the pose unobserved
   kLowSupport,  // too few lines, or too little of the visible map was found in the image
 };
@@ -49,6 +49,9 @@ struct PosePrior {
   std::optional<GravityPrior> gravity = std::nullopt;
 };
 
+/// Beside the first one, a frame may have so many priors.
+inline constexpr size_t kMaxMorePriors = 8;
+
 /// A 2D-3D point correspondence, from the host or from points/.
 struct PointMatch {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
@@ -72,8 +75,8 @@ struct PoseRefinerOptions {
   /// Seed of the search's random draws; the frame's `seed` is mixed in.
   uint64_t seed = 0;
   /// Time that a frame may take, about; 0: as long as it takes, and reproducible. When it runs out,
-  /// hypotheses, alignment levels, further starts, the second attempt and the last steps are left
-  /// out, in this order as they come; the acceptance gate never is. >= 0.
+  /// hypotheses, alignment levels, further starts, further priors, the second attempt and the last
+  /// steps are left out, in this order as they come; the acceptance gate never is. >= 0.
   int64_t time_budget_ns = 0;
 
   Status Validate() const;
@@ -83,6 +86,11 @@ struct RefineInput {
   Camera camera;                       // ideal: segments and points are without a lens
   std::span<const Segment2> segments;  // after RefineSegments
   PosePrior prior;
+  /// Other places where the camera may be: hits of a retrieval or a relocaliser, a satellite fix
+  /// beside a tracked pose. At most kMaxMorePriors. Each is searched as `prior` is, and the time
+  /// grows with their number; the pose that the segments speak for is refined, none is when they
+  /// speak for several or for no place. What is kept then is `prior`. Not with kPaper.
+  std::span<const PosePrior> more_priors = {};
   std::span<const PointMatch> points;  // optional
   /// False: local refinement only, for priors within about 2 cm / 0.5 deg (stream mode).
   bool search = true;
@@ -119,13 +127,17 @@ struct RefineResult {
   /// Of the left perturbation (rotation [rad], translation [m]) of cam_from_world; the prior's own
   /// unless kRefined.
   Matrix6d covariance = Matrix6d::Identity();
+  /// Of the prior that the refined pose was found from: 0 for `prior`, k for more_priors[k - 1].
+  uint32_t prior_index = 0;
   int num_observed_directions =
       0;                     // of 6, directions that the matches determine better than the prior
   double map_support = 0.0;  // share of the visible map's length that was found, 0..1
   /// How much likelier the segments are at the pose found than by chance, as a logarithm [nats]
   /// (MatchEvidence); also of poses that were refused.
   double evidence_nats = 0.0;
-  double runner_up_ratio = 0.0;    // support of the best clearly different pose over the winner's
+  /// Support of the best clearly different pose over the winner's; of poses from other priors their
+  /// evidence over the winner's.
+  double runner_up_ratio = 0.0;
   std::vector<LineMatch> matches;  // at cam_from_world
   uint32_t num_points_used = 0;
   // Time of the stages [ns].

@@ -90,6 +90,15 @@ Status CheckGravity(const GravityPrior& gravity) {
 Status CheckRefineInput(const RefineInput& input) {
   if (Status status = CheckCamera(input.camera); !status) return status;
   if (Status status = CheckPrior(input.prior); !status) return status;
+  if (input.more_priors.size() > kMaxMorePriors) {
+    return Invalid("more_priors has " + std::to_string(input.more_priors.size()) +
+                   " entries, more than " + std::to_string(kMaxMorePriors));
+  }
+  for (size_t i = 0; i < input.more_priors.size(); ++i) {
+    if (Status status = CheckPrior(input.more_priors[i]); !status) {
+      return Invalid("more_priors[" + std::to_string(i) + "]: " + status.error().message);
+    }
+  }
   for (size_t i = 0; i < input.segments.size(); ++i) {
     const Segment2& segment = input.segments[i];
     if (IsPixel(segment.start) && IsPixel(segment.end)) continue;

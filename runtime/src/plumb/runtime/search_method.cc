@@ -92,54 +92,144 @@ SearchMethod::SearchMethod(const MapIndex& index, const PoseRefinerOptions& opti
 void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   Stopwatch whole, watch;
   stages_ = {};
+  search_ns_ = 0;
   deadline_ = Deadline(options_.time_budget_ns);
   fine_lines_pose_.reset();
+  is_image_set_ = false;
+  kept_ = input.prior.cam_from_world;
   segments_.Assign(input.segments, kMaxSegments);
-  watch.Lap();
-  AcceptPoints(input);
-  stages_.points_ns = watch.Lap();
-  PosePrior prior = input.prior;
-  const uint32_t num_tried = CountDistinctPoses(prior, input.search ? options_.num_hypotheses : 1);
-  Attempt attempt = Try(input, prior, options_.num_hypotheses, num_tried);
-  int64_t search_ns = attempt.search_ns;
-  // Points that decide leave a second search nothing to find.
-  if (input.search && MayWiden(attempt, prior.cam_from_world) && !HoldsByPoints(input) &&
-      !IsOutOfTime(kWideningShare)) {
-    PosePrior wide = prior;
-    wide.position_sigma_m *= kWideningFactor;
-    wide.rotation_sigma_rad *= kWideningFactor;
-    const uint32_t num_hypotheses = std::min(kMaxHypotheses, 2 * options_.num_hypotheses);
-    const Attempt second =
-        Try(input, wide, num_hypotheses, num_tried + CountDistinctPoses(wide, num_hypotheses));
-    search_ns += second.search_ns;
-    if (second.status == RefineStatus::kRefined) {
-      attempt = second;
-      prior = wide;
-    }
-  }
-  if (input.search && attempt.status == RefineStatus::kRefined &&
-      attempt.evidence.evidence_nats < kWeakNats && !HoldsByPoints(input) &&
-      !IsOutOfTime(kWideningShare) && HasRival(input, prior, attempt, &search_ns)) {
-    attempt.status = RefineStatus::kAmbiguous;
-  }
+  BeginTrials(input);
+  WidenTrials();
+  const PriorChoice choice = Choose(input.camera);
+  const Trial& trial = trials_[choice.prior];
+  const Attempt& attempt = trial.attempt;
+  result->status = choice.status;
+  result->runner_up_ratio = choice.runner_up_ratio;
   result->map_support = attempt.evidence.refined.map_share;
   result->evidence_nats = attempt.evidence.evidence_nats;
-  result->runner_up_ratio = attempt.evidence.runner_up_ratio;
   result->num_observed_directions = attempt.evidence.num_observed_directions;
-  result->status = attempt.status;
-  if (attempt.status != RefineStatus::kRefined && HoldsByPoints(input)) {
-    // The lines do not decide, the points do.
-    result->status = RefineStatus::kRefined;
-    attempt.alignment = FineAlignment{};
-    attempt.alignment.cam_from_world = point_pose_.cam_from_world;
+  const bool holds_by_points = HoldsByPoints(trial.input, trial.points);
+  if (input.search && result->status == RefineStatus::kRefined &&
+      attempt.evidence.evidence_nats < kWeakNats && !holds_by_points &&
+      !IsOutOfTime(kWideningShare) && HasRival(trial)) {
+    result->status = RefineStatus::kAmbiguous;
   }
-  if (result->status == RefineStatus::kRefined) Finish(input, prior, attempt.alignment, result);
+  if (result->status == RefineStatus::kRefined) {
+    result->prior_index = static_cast<uint32_t>(choice.prior);
+    FineAlignment start = attempt.alignment;
+    if (attempt.status != RefineStatus::kRefined) {
+      // The lines do not decide, the points do.
+      start = FineAlignment{};
+      start.cam_from_world = trial.points.cam_from_world;
+    }
+    Finish(trial.input, trial.prior, start, result);
+  }
   watch.Lap();
   ReportMatches(input.camera, result->cam_from_world, result);
   stages_.report_ns = watch.Lap();
-  result->search_ns = search_ns;
-  result->match_and_refine_ns = whole.Lap() - search_ns;
+  result->search_ns = search_ns_;
+  result->match_and_refine_ns = whole.Lap() - search_ns_;
   result->stages = stages_;
+}
+
+void SearchMethod::BeginTrials(const RefineInput& input) {
+  trials_.clear();
+  const size_t num_priors = 1 + input.more_priors.size();
+  const uint32_t num_hypotheses = input.search ? options_.num_hypotheses : 1;
+  uint32_t num_tried = CountDistinctPoses(input.prior, num_hypotheses);
+  for (const PosePrior& prior : input.more_priors) {
+    num_tried += CountDistinctPoses(prior, num_hypotheses);
+  }
+  AcceptPoints(input);
+  for (size_t k = 0; k < num_priors; ++k) {
+    if (k > 0 && IsOutOfTime(kStartsShare)) return;
+    AddTrial(input, k);
+    Trial& trial = trials_.back();
+    Stopwatch watch;
+    trial.points = SolvePoints(trial.input);
+    stages_.points_ns += watch.Lap();
+    try_deadline_ =
+        num_priors == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_priors - k));
+    trial.attempt = Try(trial, trial.prior, options_.num_hypotheses, num_tried);
+  }
+}
+
+void SearchMethod::AddTrial(const RefineInput& input, size_t prior) {
+  Trial& trial = trials_.emplace_back();
+  trial.input = input;
+  trial.input.more_priors = {};
+  if (prior > 0) {
+    trial.input.prior = input.more_priors[prior - 1];
+    trial.input.seed = MixSeeds(input.seed, prior);
+  }
+  trial.prior = trial.input.prior;
+}
+
+bool SearchMethod::HasSucceeded(const Trial& trial) const {
+  return trial.attempt.status == RefineStatus::kRefined ||
+         HoldsByPoints(trial.input, trial.points) ||
+         (trial.attempt.status == RefineStatus::kKeptPrior && !MayWiden(trial.attempt));
+}
+
+bool SearchMethod::ShouldWiden(const Trial& trial) const {
+  return trial.input.search && MayWiden(trial.attempt);
+}
+
+void SearchMethod::WidenTrials() {
+  const auto has_succeeded = [this](const Trial& trial) { return HasSucceeded(trial); };
+  if (std::any_of(trials_.begin(), trials_.end(), has_succeeded)) return;
+  const uint32_t num_hypotheses = std::min(kMaxHypotheses, 2 * options_.num_hypotheses);
+  uint32_t num_tried = 0;
+  size_t num_left = 0;
+  const auto widened = [](const Trial& trial) {
+    PosePrior wide = trial.input.prior;
+    wide.position_sigma_m *= kWideningFactor;
+    wide.rotation_sigma_rad *= kWideningFactor;
+    return wide;
+  };
+  for (const Trial& trial : trials_) {
+    num_tried += CountDistinctPoses(trial.prior, options_.num_hypotheses);
+    if (!ShouldWiden(trial)) continue;
+    num_tried += CountDistinctPoses(widened(trial), num_hypotheses);
+    ++num_left;
+  }
+  for (Trial& trial : trials_) {
+    if (!ShouldWiden(trial)) continue;
+    if (IsOutOfTime(kWideningShare)) return;
+    const PosePrior wide = widened(trial);
+    try_deadline_ = num_left == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_left));
+    --num_left;
+    const Attempt second = Try(trial, wide, num_hypotheses, num_tried);
+    if (second.status != RefineStatus::kRefined) continue;
+    trial.attempt = second;
+    trial.prior = wide;
+  }
+}
+
+PriorChoice SearchMethod::Choose(const Camera& camera) {
+  Stopwatch watch;
+  outcomes_.clear();
+  for (const Trial& trial : trials_) {
+    PriorOutcome& outcome = outcomes_.emplace_back();
+    outcome.status = trial.attempt.status;
+    outcome.runner_up_ratio = trial.attempt.evidence.runner_up_ratio;
+    outcome.evidence_nats = trial.attempt.evidence.evidence_nats;
+    if (trial.attempt.has_pose) {
+      outcome.cam_from_world = trial.attempt.alignment.cam_from_world;
+      if (trials_.size() > 1) {
+        selector_.SelectForSearch(camera, *outcome.cam_from_world, 0.0, &search_lines_);
+        outcome.evidence_nats = MeasureEvidence(camera, *outcome.cam_from_world).nats;
+      }
+    }
+    if (outcome.status != RefineStatus::kRefined && HoldsByPoints(trial.input, trial.points)) {
+      outcome.status = RefineStatus::kRefined;
+      outcome.cam_from_world = trial.points.cam_from_world;
+      outcome.num_deciding_points = trial.points.num_inliers;
+    }
+  }
+  const PriorChoice choice = ChoosePrior(outcomes_);
+  stages_.support_ns += watch.Lap();
+  return choice;
 }
 
 void SearchMethod::Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
@@ -175,41 +265,40 @@ void SearchMethod::AcceptPoints(const RefineInput& input) {
     observed_points_.push_back({match.pixel, match.point_in_world, match.deviation_in_world});
   }
   all_points_.Assign(observed_points_, input.prior.cam_from_world);
-  point_pose_ = {};
-  if (all_points_.size() >= kMinSolvingPoints) {
-    point_pose_ = point_solver_.Solve(input.camera, WeakFactor(input.prior), all_points_);
-  }
 }
 
-bool SearchMethod::HoldsByPoints(const RefineInput& input) const {
-  return point_pose_.num_inliers >= kMinDecidingPoints &&
-         2 * point_pose_.num_inliers >= all_points_.size() &&
-         IsPlausible(point_pose_.cam_from_world, input.prior);
+PointPose SearchMethod::SolvePoints(const RefineInput& input) {
+  if (all_points_.size() < kMinSolvingPoints) return {};
+  return point_solver_.Solve(input.camera, WeakFactor(input.prior), all_points_);
 }
 
-bool SearchMethod::HasRival(const RefineInput& input, const PosePrior& prior,
-                            const Attempt& attempt, int64_t* search_ns) {
-  PosePrior wide = prior;
+bool SearchMethod::HoldsByPoints(const RefineInput& input, const PointPose& points) const {
+  return points.num_inliers >= kMinDecidingPoints && 2 * points.num_inliers >= all_points_.size() &&
+         IsPlausible(points.cam_from_world, input.prior);
+}
+
+bool SearchMethod::HasRival(const Trial& trial) {
+  PosePrior wide = trial.prior;
   wide.position_sigma_m *= kRivalFactor;
   wide.rotation_sigma_rad *= kRivalFactor;
-  const Attempt second = Try(input, wide, kMaxHypotheses, kMaxHypotheses);
-  *search_ns += second.search_ns;
-  const Rigid3& pose = attempt.alignment.cam_from_world;
+  try_deadline_ = deadline_;
+  Try(trial, wide, kMaxHypotheses, kMaxHypotheses);
+  const Rigid3& pose = trial.attempt.alignment.cam_from_world;
   // On the lines that the wide prior sees, as the supports of the survivors.
-  const double needed = kWeakRunnerUpRatio * MeasureSupport(input.camera, pose).Value();
+  const double needed = kWeakRunnerUpRatio * MeasureSupport(trial.input.camera, pose).Value();
   return std::any_of(survivors_.begin(), survivors_.end(), [&](const Survivor& survivor) {
     return survivor.support.Value() > needed &&
            IsClearlyDifferent(survivor.alignment.cam_from_world, pose);
   });
 }
 
-bool SearchMethod::MayWiden(const Attempt& attempt, const Rigid3& prior) {
+bool SearchMethod::MayWiden(const Attempt& attempt) const {
   switch (attempt.status) {
     case RefineStatus::kLowSupport:
     case RefineStatus::kAmbiguous:
       return true;
     case RefineStatus::kKeptPrior:  // A prior that the search came back to is trusted.
-      return IsClearlyDifferent(attempt.alignment.cam_from_world, prior);
+      return IsClearlyDifferent(attempt.alignment.cam_from_world, kept_);
     case RefineStatus::kRefined:
     case RefineStatus::kDegenerate:
       return false;
@@ -217,8 +306,9 @@ bool SearchMethod::MayWiden(const Attempt& attempt, const Rigid3& prior) {
   return false;
 }
 
-SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrior& prior,
+SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const PosePrior& prior,
                                         uint32_t num_hypotheses, uint32_t num_tried) {
+  const RefineInput& input = trial.input;
   Attempt attempt;
   attempt.alignment.cam_from_world = prior.cam_from_world;
   survivors_.clear();
@@ -229,8 +319,8 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
   stages_.index_ns += watch.Lap();
   if (search_lines_.size() < kMinLines || segments_.segments.size() < kMinSegments) return attempt;
 
-  const std::span<const FoundPose> starts = FindStarts(input, prior, num_hypotheses);
-  attempt.search_ns = watch.Lap();
+  const std::span<const FoundPose> starts = FindStarts(trial, prior, num_hypotheses);
+  search_ns_ += watch.Lap();
   const auto schedule = input.search ? FineSchedule() : StreamSchedule();
   const auto align_from = [&](const Rigid3& start) {
     watch.Lap();
@@ -253,11 +343,12 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
     stages_.support_ns += watch.Lap();
   };
   for (const FoundPose& start : starts) {
-    if (!survivors_.empty() && IsOutOfTime(kStartsShare)) break;
+    if (!survivors_.empty() && IsOutOfTime(try_deadline_, kStartsShare)) break;
     align_from(start.cam_from_world);
   }
-  if (point_pose_.num_inliers >= kMinSolvingPoints) align_from(point_pose_.cam_from_world);
+  if (trial.points.num_inliers >= kMinSolvingPoints) align_from(trial.points.cam_from_world);
   if (survivors_.empty()) return attempt;
+  attempt.has_pose = true;
   const Survivor& best = *std::max_element(
       survivors_.begin(), survivors_.end(),
       [](const Survivor& a, const Survivor& b) { return a.support.Value() < b.support.Value(); });
@@ -272,7 +363,7 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
   watch.Lap();
   attempt.evidence = {
       .refined = best.support,
-      .prior = MeasureSupport(input.camera, prior.cam_from_world),
+      .prior = MeasureSupport(input.camera, kept_),
       .runner_up_ratio = value > 0.0 ? runner_up / value : 0.0,
       .is_near_prior = IsPlausible(best.alignment.cam_from_world, input.prior),
       .evidence_nats = MeasureEvidence(input.camera, best.alignment.cam_from_world).nats,
@@ -288,9 +379,9 @@ SearchMethod::Attempt SearchMethod::Try(const RefineInput& input, const PosePrio
   return attempt;
 }
 
-std::span<const FoundPose> SearchMethod::FindStarts(const RefineInput& input,
-                                                    const PosePrior& prior,
+std::span<const FoundPose> SearchMethod::FindStarts(const Trial& trial, const PosePrior& prior,
                                                     uint32_t num_hypotheses) {
+  const RefineInput& input = trial.input;
   if (!input.search) {
     only_prior_[0] = {prior.cam_from_world, 0.0};
     return only_prior_;
@@ -299,26 +390,30 @@ std::span<const FoundPose> SearchMethod::FindStarts(const RefineInput& input,
   for (const CandidateLine& line : search_lines_) {
     lines_to_find_.push_back({line.segment_in_world, line.weight});
   }
+  if (!is_image_set_) {
+    Stopwatch watch;
+    pose_search_.SetImage(input.camera, segments_.segments);
+    is_image_set_ = true;
+    stages_.field_ns = watch.Lap();
+  }
   PoseSearchOptions search{
-      .num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors, .deadline = deadline_};
-  if (HoldsByPoints(input)) {
+      .num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors, .deadline = try_deadline_};
+  if (HoldsByPoints(input, trial.points)) {
     search.num_aligned = kAlignedBesidePoints;
     search.num_wide = 0;
     search.num_survivors = 1;
   }
-  const std::span<const FoundPose> found =
-      pose_search_.Search(input.camera, RegionOf(prior), lines_to_find_, segments_.segments, search,
-                          MixSeeds(options_.seed, input.seed));
+  const std::span<const FoundPose> found = pose_search_.Search(
+      RegionOf(prior), lines_to_find_, search, MixSeeds(options_.seed, input.seed));
   const PoseSearchTimes& times = pose_search_.times();
-  stages_.field_ns += times.field_ns;
   stages_.score_ns += times.draw_ns + times.score_ns;
   stages_.coarse_ns += times.align_ns;
   stages_.num_hypotheses += num_hypotheses;
   return found;
 }
 
-bool SearchMethod::IsOutOfTime(double share) {
-  if (!deadline_.HasPassed(share)) return false;
+bool SearchMethod::IsOutOfTime(const Deadline& deadline, double share) {
+  if (!deadline.HasPassed(share)) return false;
   stages_.out_of_time = true;
   return true;
 }

@@ -20,12 +20,15 @@
 #include "plumb/runtime/one_to_one_solver.h"
 #include "plumb/runtime/point_solver.h"
 #include "plumb/runtime/pose_refiner.h"
+#include "plumb/runtime/prior_choice.h"
 #include "plumb/search/pose_search.h"
 
 namespace plumb {
 
-/// One per PoseRefiner; input must have been checked. Owns all work space.
-/// Source: docs/method/association.md, "search".
+/// One per PoseRefiner; input must have been checked. Owns all work space. Each of several priors
+/// is searched as if it were the only one, those without success once more and farther off when
+/// none has any; ChoosePrior() decides between what was found. Source: docs/method/association.md,
+/// "search".
 class SearchMethod {
  public:
   SearchMethod(const MapIndex& index, const PoseRefinerOptions& options);
@@ -38,33 +41,49 @@ class SearchMethod {
   /// One try to find the pose within an uncertainty.
   struct Attempt {
     RefineStatus status = RefineStatus::kLowSupport;
+    bool has_pose = false;  // something was found, whatever it is worth
     GateEvidence evidence;
     FineAlignment alignment;  // of the best pose, on the fused lines
-    int64_t search_ns = 0;
+  };
+  /// What was tried around one of the frame's priors.
+  struct Trial {
+    RefineInput input;  // the frame's, with this prior alone
+    PosePrior prior;    // as the last attempt searched it: the input's, or wider
+    PointPose points;   // without inliers: none
+    Attempt attempt;
   };
   struct Survivor {
     FineAlignment alignment;
     PoseSupport support;
   };
 
+  /// Searches around every prior.
+  void BeginTrials(const RefineInput& input);
+  void AddTrial(const RefineInput& input, size_t prior);
+  /// Searches farther off around every prior where that can help, unless one has succeeded.
+  void WidenTrials();
+  bool HasSucceeded(const Trial& trial) const;
+  bool ShouldWiden(const Trial& trial) const;
+  PriorChoice Choose(const Camera& camera);
   /// @param num_tried  Poses that the frame has tried in the end, for EvidenceToBeat().
-  Attempt Try(const RefineInput& input, const PosePrior& prior, uint32_t num_hypotheses,
+  Attempt Try(const Trial& trial, const PosePrior& prior, uint32_t num_hypotheses,
               uint32_t num_tried);
   /// Whether a search with a larger uncertainty can still help.
-  static bool MayWiden(const Attempt& attempt, const Rigid3& prior);
+  bool MayWiden(const Attempt& attempt) const;
   /// Whether a pose far from an attempt's, farther than the prior says, explains the lines nearly
   /// as well.
-  bool HasRival(const RefineInput& input, const PosePrior& prior, const Attempt& attempt,
-                int64_t* search_ns);
-  /// Solves the pose from the points alone, if there are enough.
+  bool HasRival(const Trial& trial);
   void AcceptPoints(const RefineInput& input);
-  bool HoldsByPoints(const RefineInput& input) const;
-  std::span<const FoundPose> FindStarts(const RefineInput& input, const PosePrior& prior,
+  /// Solves the pose from the points alone, if there are enough.
+  PointPose SolvePoints(const RefineInput& input);
+  bool HoldsByPoints(const RefineInput& input, const PointPose& points) const;
+  std::span<const FoundPose> FindStarts(const Trial& trial, const PosePrior& prior,
                                         uint32_t num_hypotheses);
   /// Keeps the lines of a pose that is near enough.
   void SelectFineLines(const Camera& camera, const Rigid3& cam_from_world);
   /// Whether work that starts now has to be left out.
-  bool IsOutOfTime(double share = 1.0);
+  bool IsOutOfTime(double share = 1.0) { return IsOutOfTime(deadline_, share); }
+  bool IsOutOfTime(const Deadline& deadline, double share);
   PoseSupport MeasureSupport(const Camera& camera, const Rigid3& cam_from_world);
   MatchEvidence MeasureEvidence(const Camera& camera, const Rigid3& cam_from_world);
   /// What a pose needs to be accepted, from chance and from the map's own key frames.
@@ -98,7 +117,6 @@ class SearchMethod {
   ProjectedLines projected_;
   std::vector<Survivor> survivors_;
   PointSolver point_solver_;
-  PointPose point_pose_;  // without inliers: none
   std::vector<PointObservation> observed_points_;
   PointTable all_points_, near_points_;
   PointTableAccumulator point_terms_;
@@ -111,8 +129,15 @@ class SearchMethod {
   SoftAssociator associator_;
   std::vector<LinePair> pairs_;
   std::vector<int32_t> best_pair_;  // per segment
-  RefineStages stages_;             // of this frame
+  // Of this frame:
+  Rigid3 kept_;                // the pose that is returned unless a better one is found
+  std::vector<Trial> trials_;  // of its priors, in their order
+  std::vector<PriorOutcome> outcomes_;
+  bool is_image_set_ = false;  // of pose_search_
+  int64_t search_ns_ = 0;
+  RefineStages stages_;
   Deadline deadline_;
+  Deadline try_deadline_;  // of the attempt at hand
 };
 
 }  // namespace plumb

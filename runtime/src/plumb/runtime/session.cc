@@ -110,6 +110,11 @@ struct Session::Impl {
 Result<SubmitOutcome> Session::Impl::Submit(const SessionFrame& frame) {
   const int64_t now_ns = NowNs();
   if (const Status valid = ValidateFrame(frame); !valid) return valid.error();
+  if (!frame.more_priors.empty() && options.refiner.method == RefineMethod::kPaper) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "SessionFrame: more_priors has " + std::to_string(frame.more_priors.size()) +
+                     " entries, the paper's method takes one prior only"};
+  }
   if (is_device_lost) {
     return Error{ErrorCode::kDeviceLost, "Session: the detector's device is lost"};
   }
@@ -231,6 +236,7 @@ Status Session::Impl::RefineFrame(FrameSlot* slot) {
   input.camera = slot->rectifier.ideal();
   input.segments = result.segments;
   input.prior = slot->ticket.prior;
+  input.more_priors = slot->more_priors;
   input.points = slot->points;
   input.seed = slot->ticket.index;
   const bool is_stream = options.mode == SessionMode::kStream;

@@ -57,6 +57,9 @@ struct SessionFrame {
   ImageCamera camera;        // of the image's size, with its lens
   int64_t timestamp_ns = 0;  // strictly increasing within a session
   PosePrior prior;
+  /// Optional; other places where the camera may be (RefineInput::more_priors). In kStream they are
+  /// tried when the stream has to be searched for; a stream that goes on does not ask them.
+  std::span<const PosePrior> more_priors = {};
   /// Optional; in pixels of the image. Those that the lens cannot have imaged are left out.
   std::span<const PointMatch> points;
   uint64_t user_tag = 0;  // these two come back in the result

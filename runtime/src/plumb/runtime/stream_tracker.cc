@@ -20,6 +20,7 @@ Status StreamTracker::Track(const RefineInput& input, RefineResult* out_result) 
     RefineInput local_input = input;
     local_input.prior = *local;
     local_input.prior.gravity = input.prior.gravity;
+    local_input.more_priors = {};
     local_input.search = false;
     if (const Status status = refiner_->Refine(local_input, out_result); !status) return status;
     match_ns = out_result->match_and_refine_ns;
@@ -45,6 +46,7 @@ Status StreamTracker::Search(const RefineInput& input, RefineResult* out_result)
   if (!state_.last || !IsLost(state_, options_, *out_result)) return Ok();
 
   search_input.prior = input.prior;
+  search_input.more_priors = {};    // tried already
   search_input.seed = ~input.seed;  // other draws
   if (const Status status = refiner_->Refine(search_input, &second_); !status) return status;
   const int64_t search_ns = out_result->search_ns + second_.search_ns;

@@ -20,7 +20,8 @@ class StreamTracker {
   explicit StreamTracker(PoseRefiner* refiner, const StreamOptions& options = {});
 
   /// @param input       As for PoseRefiner::Refine; `prior` is the tracker's pose with the
-  ///                    uncertainty of its drift, `search` is ignored.
+  ///                    uncertainty of its drift, `search` is ignored. `more_priors` are tried
+  ///                    when the stream has to be searched for.
   /// @param out_result  `cam_from_world` is the corrected prediction where there is nothing better,
   ///                    not the tracker's pose. Its times include a failed local refinement.
   /// @return what PoseRefiner::Refine returns; after an error the stream is as it was before.

@@ -425,13 +425,16 @@ static void test_more_priors(const fixture* f, const plumb_map* map) {
     change;                                                                                        \
     EXPECT_ERROR(plumb_session_submit_frame(session, &frame), PLUMB_ERROR_INVALID_ARGUMENT, part); \
   } while (0)
-  EXPECT_REFUSED(more[1].struct_size = 0, "more_priors[1]: plumb_pose_prior.struct_size 0");
+  EXPECT_REFUSED(more[1].struct_size = 0, "more_priors[1].struct_size 0");
   EXPECT_REFUSED(more[1].struct_size = sizeof longer[0], "more_priors[1].struct_size 376");
   EXPECT_REFUSED(more[1].uncertainty = 7, "more_priors[1].uncertainty 7");
   EXPECT_REFUSED(more[1].t_m[2] = NAN, "more_priors[1].q_xyzw or t_m is not finite");
   EXPECT_REFUSED(more[1].q_xyzw[0] = 3.0, "more_priors[1].q_xyzw has norm");
   EXPECT_REFUSED(more[1].position_sigma_m = -0.25, "more_priors[1].position_sigma_m -0.25");
   EXPECT_REFUSED(more[1].uncertainty = PLUMB_UNCERTAINTY_COVARIANCE, "more_priors[1].covariance");
+  EXPECT_REFUSED(more[0].struct_size = 0, "more_priors[0]: plumb_pose_prior.struct_size 0");
+  EXPECT_REFUSED(more[0].struct_size = 369, "more_priors[0].struct_size 369");
+  more[0].struct_size = sizeof more[0];
   EXPECT_REFUSED(frame.more_priors = NULL, "more_priors is NULL");
   frame.more_priors = more;
   EXPECT_REFUSED(frame.num_more_priors = PLUMB_MAX_MORE_PRIORS + 1, "num_more_priors 9");

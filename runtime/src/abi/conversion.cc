@@ -148,6 +148,11 @@ Status MorePriorsFromAbi(const plumb_frame& frame, std::vector<PosePrior>* out_p
   if (frame.more_priors == nullptr) return Invalid("frame.more_priors is NULL");
   const auto* bytes = reinterpret_cast<const unsigned char*>(frame.more_priors);
   const uint32_t stride = frame.more_priors->struct_size;
+  if (stride % alignof(plumb_pose_prior) != 0) {
+    return Invalid("frame.more_priors[0].struct_size " + std::to_string(stride) +
+                   " is not the size of plumb_pose_prior (" +
+                   std::to_string(sizeof(plumb_pose_prior)) + ")");
+  }
   for (uint32_t i = 0; i < frame.num_more_priors; ++i) {
     const auto* entry =
         reinterpret_cast<const plumb_pose_prior*>(bytes + static_cast<size_t>(i) * stride);
@@ -155,13 +160,14 @@ Status MorePriorsFromAbi(const plumb_frame& frame, std::vector<PosePrior>* out_p
       return Error{error.code,
                    "frame.more_priors[" + std::to_string(i) + "]" + between + error.message};
     };
-    const Result<plumb_pose_prior> read = ReadStruct(entry, kPosePriorSizeV1, "plumb_pose_prior");
-    if (!read) return wrong(read.error(), ": ");
-    if (read->struct_size != stride) {
+    // Before it is believed: a larger size would be read past the end of the array.
+    if (entry->struct_size != stride) {
       return Invalid("frame.more_priors[" + std::to_string(i) + "].struct_size " +
-                     std::to_string(read->struct_size) + " is not the first one's " +
+                     std::to_string(entry->struct_size) + " is not the first one's " +
                      std::to_string(stride));
     }
+    const Result<plumb_pose_prior> read = ReadStruct(entry, kPosePriorSizeV1, "plumb_pose_prior");
+    if (!read) return wrong(read.error(), ": ");
     const Result<PosePrior> prior = PriorFromAbi(frame.pose_convention, *read);
     if (!prior) return wrong(prior.error(), ".");
     out_priors->push_back(*prior);

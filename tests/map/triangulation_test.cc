@@ -23,7 +23,8 @@ struct Recording {
   std::vector<Rigid3> poses;
   std::vector<std::vector<Segment2>> segments;
 
-  std::vector<std::vector<LiftedSegment>> Lift(const TriangulationOptions& options = {}) const {
+  std::vector<std::vector<TriangulatedSegment>> Lift(
+      const TriangulationOptions& options = {}) const {
     std::vector<SegmentView> views;
     for (size_t k = 0; k < poses.size(); ++k) {
       views.push_back({RoomCamera(), poses[k], segments[k]});
@@ -52,14 +53,14 @@ std::vector<Rigid3> Walk(int count) {
   return poses;
 }
 
-size_t Count(const std::vector<std::vector<LiftedSegment>>& lifted) {
+size_t Count(const std::vector<std::vector<TriangulatedSegment>>& lifted) {
   size_t count = 0;
   for (const auto& view : lifted) count += view.size();
   return count;
 }
 
 // Distance of the lifted segment's farther end from the line that is nearest to both ends.
-double ErrorOf(const LiftedSegment& segment, const std::vector<Segment3>& lines) {
+double ErrorOf(const TriangulatedSegment& segment, const std::vector<Segment3>& lines) {
   double least = 1e9;
   for (const Segment3& line : lines) {
     const Eigen::Vector3d direction = line.Delta().normalized();
@@ -78,13 +79,23 @@ TEST(Triangulation, LiftedSegmentsLieOnTheTrueLines) {
   const auto lifted = recording.Lift();
   std::vector<double> errors;
   for (size_t v = 0; v < lifted.size(); ++v) {
-    for (const LiftedSegment& segment : lifted[v]) {
+    uint32_t next_source = 0;
+    for (const TriangulatedSegment& segment : lifted[v]) {
       errors.push_back(ErrorOf(segment, lines));
-      EXPECT_FALSE(segment.line);
-      // On the rays of the ends of one of the view's segments.
-      const Eigen::Vector2d start =
-          RoomCamera().Project(recording.poses[v] * segment.segment_in_world.start);
-      EXPECT_LT((start - segment.segment_px.start).norm(), 1e-6);
+      ASSERT_GE(segment.source, next_source);
+      next_source = segment.source + 1;
+      ASSERT_LT(segment.source, recording.segments[v].size());
+      // On the rays of the ends, at the given depths.
+      const Segment2& source = recording.segments[v][segment.source];
+      const Segment3& in_world = segment.segment_in_world;
+      const Eigen::Vector3d start = recording.poses[v] * in_world.start;
+      const Eigen::Vector3d end = recording.poses[v] * in_world.end;
+      EXPECT_LT((RoomCamera().Project(start) - source.start).norm(), 1e-6);
+      EXPECT_LT((RoomCamera().Project(end) - source.end).norm(), 1e-6);
+      EXPECT_NEAR(start.z(), segment.depth_m[0], 1e-9);
+      EXPECT_NEAR(end.z(), segment.depth_m[1], 1e-9);
+      EXPECT_GT(segment.sigma_m[0], 0.0);
+      EXPECT_GT(segment.sigma_m[1], 0.0);
     }
   }
   size_t num_segments = 0;
@@ -137,7 +148,7 @@ TEST(Triangulation, MotionAlongTheLinesLiftsOnlyTheOthers) {
   const auto lifted = Record(both, poses, options).Lift();
   EXPECT_GT(Count(lifted), 9u * across.size() * 7 / 10);
   for (const auto& view : lifted) {
-    for (const LiftedSegment& segment : view) EXPECT_LT(ErrorOf(segment, across), 0.05);
+    for (const TriangulatedSegment& segment : view) EXPECT_LT(ErrorOf(segment, across), 0.05);
   }
 }
 
@@ -161,8 +172,10 @@ TEST(Triangulation, UnusableSegmentsAreLeftOut) {
   }
   const auto lifted = recording.Lift();
   EXPECT_GT(Count(lifted), 0u);
-  for (const auto& view : lifted) {
-    for (const LiftedSegment& segment : view) EXPECT_GE(segment.segment_px.Length(), 12.0);
+  for (size_t v = 0; v < lifted.size(); ++v) {
+    for (const TriangulatedSegment& segment : lifted[v]) {
+      EXPECT_GE(recording.segments[v][segment.source].Length(), 12.0);
+    }
   }
 }
 

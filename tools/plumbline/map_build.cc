@@ -31,7 +31,7 @@ namespace {
 struct MapBuildOptions {
   std::string sequence, frames, colmap, images, out;
   DetectorOptions detector;
-  std::string depth;   // empty: sensor for a sequence, views for a COLMAP model
+  std::string depth;   // empty: both for a sequence, views for a COLMAP model
   std::string points;  // empty: opencv where there is depth
   bool calibrate = true;
   bool adjust_poses = false;
@@ -39,10 +39,10 @@ struct MapBuildOptions {
   bool json = false;
 
   DepthSource Source() const {
-    if (depth.empty()) return colmap.empty() ? DepthSource::kSensor : DepthSource::kViews;
+    if (depth.empty()) return colmap.empty() ? DepthSource::kBoth : DepthSource::kViews;
     return *DepthSourceOf(depth);
   }
-  bool WithDepth() const { return Source() == DepthSource::kSensor; }
+  bool WithDepth() const { return Source() != DepthSource::kViews; }
   bool WithPoints() const { return points.empty() ? WithDepth() : points == "opencv"; }
 };
 
@@ -147,6 +147,14 @@ Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, const
                   stats.num_lines, stats.num_multi_view_lines, stats.num_segments,
                   stats.num_key_frames, seconds);
     std::string report = options.out + ": " + text;
+    if (options.Source() == DepthSource::kBoth) {
+      std::snprintf(
+          text, sizeof(text),
+          "depth corrected by %.2f %% (median); %zu segments with the mean of depth image "
+          "and views\n",
+          100.0 * stats.depth_change, stats.num_averaged);
+      report += text;
+    }
     if (change) {
       std::snprintf(text, sizeof(text),
                     "poses adjusted by %.2f cm, %.3f deg (median); segments lie %.2f px from their "
@@ -163,6 +171,8 @@ Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, const
   report["key_frames"] = stats.num_key_frames;
   report["segments"] = stats.num_segments;
   report["lifted"] = stats.num_lifted;
+  report["averaged"] = stats.num_averaged;
+  report["depth_change"] = Rounded(stats.depth_change, 5);
   report["filtered"] = stats.num_filtered;
   report["lines"] = stats.num_lines;
   report["multi_view_lines"] = stats.num_multi_view_lines;
@@ -184,8 +194,8 @@ Outcome CheckOptions(const MapBuildOptions& options) {
     return Failure{kExitUsage, "want either --sequence and --frames or --colmap and --images"};
   }
   if (from_colmap && options.WithDepth()) {
-    return Failure{kExitUsage,
-                   "--depth sensor needs --sequence: a COLMAP model has no depth images"};
+    return Failure{kExitUsage, "--depth " + options.depth +
+                                   " needs --sequence: a COLMAP model has no depth images"};
   }
   if (options.WithPoints() && !options.WithDepth()) {
     return Failure{kExitUsage, "--points opencv needs depth images, --depth views has none"};
@@ -262,9 +272,10 @@ void AddMapBuild(CLI::App& map, PendingRun& pending) {
         command.add_option("--images", options.images, "Folder of the COLMAP model's images");
         command
             .add_option("--depth", options.depth,
-                        "sensor: the sequence's depth images; views: none, lines are triangulated "
-                        "from the key frames (default: sensor, with --colmap views)")
-            ->check(CLI::IsMember({"sensor", "views"}));
+                        "sensor: the sequence's depth images as they are; views: none, lines are "
+                        "triangulated from the key frames; both: depth images, corrected by what "
+                        "the key frames triangulate (default: both, with --colmap views)")
+            ->check(CLI::IsMember({"sensor", "views", "both"}));
         BindDetectorOptions(command, options.detector);
         command
             .add_option("--out", options.out,

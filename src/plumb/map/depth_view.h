@@ -44,6 +44,10 @@ struct DepthNoise {
   double constant_m = 0.003;
 
   double SigmaAt(double depth_m) const { return quadratic_per_m * depth_m * depth_m + constant_m; }
+  /// The same of an inverse depth [1/m], to first order.
+  double InverseSigmaAt(double inverse_depth) const {
+    return quadratic_per_m + constant_m * inverse_depth * inverse_depth;
+  }
 };
 
 }  // namespace plumb

@@ -4,13 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include "plumb/map/depth_correction.h"
+#include "plumb/map/lift_fusion.h"
 #include "plumb/map/line_visibility.h"
 
 namespace plumb {
 namespace {
 
 constexpr double kUnitTolerance = 1e-3;  // of a quaternion's norm
-constexpr double kTriangulated = 0.5;    // share of the work that follows without depth images
+constexpr double kTriangulated = 0.5;    // share of the work
 
 bool IsPose(const Rigid3& pose) {
   return pose.IsFinite() && std::abs(pose.rotation.norm() - 1.0) <= kUnitTolerance;
@@ -41,6 +43,17 @@ Status Validate(const KeyFrameInput& frame, DepthSource depth_source) {
   return Ok();
 }
 
+void CorrectPoints(const DepthCorrection& correction, const Rigid3& cam_from_world,
+                   std::vector<MapPoint>* points) {
+  const Rigid3 world_from_cam = cam_from_world.Inverse();
+  for (MapPoint& point : *points) {
+    const Eigen::Vector3d in_cam = cam_from_world * point.point_in_world.cast<double>();
+    const Eigen::Vector2d ray = in_cam.hnormalized();
+    const double inverse_depth = correction(ray, 1.0 / in_cam.z());
+    point.point_in_world = (world_from_cam * (ray.homogeneous() / inverse_depth)).cast<float>();
+  }
+}
+
 }  // namespace
 
 MapBuilder::MapBuilder(MapBuilderOptions options) : options_(std::move(options)) {}
@@ -59,19 +72,11 @@ Status MapBuilder::AddKeyFrame(KeyFrameInput frame) {
   added.points = std::move(frame.points);
   ++stats_.num_key_frames;
   stats_.num_segments += frame.segments.size();
-  if (options_.depth_source == DepthSource::kViews) {
-    segments_.emplace_back(frame.segments.begin(), frame.segments.end());
-    return Ok();
-  }
-  const Rigid3 world_from_cam = added.cam_from_world.Inverse();
-  for (const LiftedPart& part :
-       LiftSegments(frame.camera, frame.depth, frame.segments, options_.lift, frame.rectifier)) {
-    added.segments.push_back(
-        {part.segment_px,
-         {world_from_cam * part.segment_in_cam.start, world_from_cam * part.segment_in_cam.end},
-         std::nullopt});
-  }
-  stats_.num_lifted += added.segments.size();
+  segments_.emplace_back(frame.segments.begin(), frame.segments.end());
+  if (options_.depth_source == DepthSource::kViews) return Ok();
+  parts_.push_back(
+      LiftSegments(frame.camera, frame.depth, frame.segments, options_.lift, frame.rectifier));
+  stats_.num_lifted += parts_.back().size();
   return Ok();
 }
 
@@ -84,10 +89,6 @@ Status MapBuilder::SetPoses(std::span<const Rigid3> cam_from_world) {
     KeyFrame& frame = key_frames_[k];
     const Rigid3 pose{cam_from_world[k].rotation.normalized(), cam_from_world[k].translation};
     const Rigid3 new_from_old = pose.Inverse() * frame.cam_from_world;
-    for (LiftedSegment& segment : frame.segments) {
-      Segment3& lifted = segment.segment_in_world;
-      lifted = {new_from_old * lifted.start, new_from_old * lifted.end};
-    }
     for (MapPoint& point : frame.points) {
       point.point_in_world = (new_from_old * point.point_in_world.cast<double>()).cast<float>();
     }
@@ -96,18 +97,47 @@ Status MapBuilder::SetPoses(std::span<const Rigid3> cam_from_world) {
   return Ok();
 }
 
-void MapBuilder::Triangulate(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames) {
+std::vector<std::vector<TriangulatedSegment>> MapBuilder::Triangulate(
+    const MapBuildProgress& progress) const {
   std::vector<SegmentView> views;
-  for (size_t k = 0; k < key_frames->size(); ++k) {
-    const KeyFrame& frame = (*key_frames)[k];
+  for (size_t k = 0; k < key_frames_.size(); ++k) {
+    const KeyFrame& frame = key_frames_[k];
     views.push_back({frame.camera, frame.cam_from_world, segments_[k]});
   }
-  std::vector<std::vector<LiftedSegment>> lifted =
-      TriangulateSegments(views, options_.triangulation, progress);
-  stats_.num_lifted = 0;
+  return TriangulateSegments(views, options_.triangulation, progress);
+}
+
+void MapBuilder::LiftByViews(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames) {
+  const std::vector<std::vector<TriangulatedSegment>> by_views = Triangulate(progress);
   for (size_t k = 0; k < key_frames->size(); ++k) {
-    stats_.num_lifted += lifted[k].size();
-    (*key_frames)[k].segments = std::move(lifted[k]);
+    for (const TriangulatedSegment& segment : by_views[k]) {
+      (*key_frames)[k].segments.push_back(
+          {segments_[k][segment.source], segment.segment_in_world, std::nullopt});
+    }
+  }
+}
+
+void MapBuilder::LiftBySensor(std::vector<KeyFrame>* key_frames) const {
+  for (size_t k = 0; k < key_frames->size(); ++k) {
+    KeyFrame& frame = (*key_frames)[k];
+    frame.segments = FuseLifts({frame.cam_from_world, segments_[k], parts_[k], {}}, {});
+  }
+}
+
+void MapBuilder::LiftByBoth(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames) {
+  const std::vector<std::vector<TriangulatedSegment>> by_views = Triangulate(progress);
+  std::vector<FrameLifts> lifts;
+  for (size_t k = 0; k < key_frames->size(); ++k) {
+    lifts.push_back({(*key_frames)[k].cam_from_world, segments_[k], parts_[k], by_views[k]});
+  }
+  const DepthNoise& noise = options_.fusion.depth_noise;
+  const std::optional<DepthFit> fit = FitDepthCorrection(CompareDepths(lifts), noise);
+  if (!fit) return LiftBySensor(key_frames);
+  stats_.depth_change = fit->median_change;
+  for (size_t k = 0; k < key_frames->size(); ++k) {
+    KeyFrame& frame = (*key_frames)[k];
+    frame.segments = FuseLifts(lifts[k], *fit, noise, &stats_.num_averaged);
+    CorrectPoints(fit->correction, frame.cam_from_world, &frame.points);
   }
 }
 
@@ -120,17 +150,26 @@ Result<LineMap> MapBuilder::Build(const MapBuildProgress& progress) {
   map.depth_source = options_.depth_source;
   map.key_frames = key_frames_;
   LineFusionOptions fusion = options_.fusion;
-  double fusion_begin = 0.0;
-  if (options_.depth_source == DepthSource::kViews) {
-    Triangulate(
-        [&progress](double done) {
-          if (progress) progress(kTriangulated * done);
-        },
-        &map.key_frames);
-    fusion.fit.lifted_ends_count = false;
-    fusion.min_key_frames = options_.triangulation.min_views;
-    fusion_begin = kTriangulated;
+  const auto triangulated = [&progress](double done) {
+    if (progress) progress(kTriangulated * done);
+  };
+  stats_.num_averaged = 0;
+  stats_.depth_change = 0.0;
+  switch (options_.depth_source) {
+    case DepthSource::kSensor:
+      LiftBySensor(&map.key_frames);
+      break;
+    case DepthSource::kBoth:
+      LiftByBoth(triangulated, &map.key_frames);
+      break;
+    case DepthSource::kViews:
+      LiftByViews(triangulated, &map.key_frames);
+      fusion.fit.lifted_ends_count = false;
+      fusion.min_key_frames = options_.triangulation.min_views;
   }
+  stats_.num_lifted = 0;
+  for (const KeyFrame& frame : map.key_frames) stats_.num_lifted += frame.segments.size();
+  const double fusion_begin = options_.depth_source == DepthSource::kSensor ? 0.0 : kTriangulated;
   map.lines = FuseLines(
       fusion, options_.pnp_filter, &map.key_frames,
       [&](double done) {

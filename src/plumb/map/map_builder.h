@@ -21,9 +21,9 @@
 namespace plumb {
 
 struct MapBuilderOptions {
-  DepthSource depth_source = DepthSource::kSensor;
-  LiftOptions lift;                    // with depth images
-  TriangulationOptions triangulation;  // without
+  DepthSource depth_source = DepthSource::kBoth;
+  LiftOptions lift;                    // with depth images, all of one sensor
+  TriangulationOptions triangulation;  // by views
   LineFusionOptions fusion;
   PnpFilterOptions pnp_filter;
   std::string detector;  // goes into the map: queries should use the same one
@@ -45,6 +45,8 @@ struct MapBuildStats {
   size_t num_key_frames = 0;
   size_t num_segments = 0;          // given
   size_t num_lifted = 0;            // with 3D end points
+  size_t num_averaged = 0;          // of those, by depth images and views that agree
+  double depth_change = 0.0;        // median of |corrected / given - 1| of the depths
   size_t num_filtered = 0;          // lifted, but rejected by the PnP-RANSAC filter
   size_t num_lines = 0;             // fused
   size_t num_multi_view_lines = 0;  // of those, seen by two key frames or more
@@ -59,7 +61,7 @@ class MapBuilder {
  public:
   explicit MapBuilder(MapBuilderOptions options = {});
 
-  /// With depth images: lifts the frame's segments. Without: keeps them for Build().
+  /// With depth images: lifts the frame's segments.
   /// @return kInvalidArgument, and the builder is unchanged, when the camera, the pose or the depth
   ///         image is invalid, the depth image has another size than the camera, or a frame with
   ///         this timestamp was added before. The message names the frame by its timestamp.
@@ -70,9 +72,9 @@ class MapBuilder {
   ///         each key frame.
   Status SetPoses(std::span<const Rigid3> cam_from_world);
 
-  /// Fuses everything added so far, without depth images triangulates it first; may be called again
-  /// after more frames or new poses. Without depth, a line has been seen by triangulation.min_views
-  /// at least.
+  /// Triangulates (unless the depth is the sensor's alone) and fuses everything added so far; may
+  /// be called again after more frames or new poses. By views alone, a line has been seen by
+  /// triangulation.min_views at least.
   /// @return kInvalidArgument when no key frame was added. A map without lines is not an error.
   Result<LineMap> Build(const MapBuildProgress& progress = {});
 
@@ -80,11 +82,15 @@ class MapBuilder {
   const MapBuildStats& stats() const { return stats_; }
 
  private:
-  void Triangulate(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames);
+  std::vector<std::vector<TriangulatedSegment>> Triangulate(const MapBuildProgress& progress) const;
+  void LiftByViews(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames);
+  void LiftBySensor(std::vector<KeyFrame>* key_frames) const;
+  void LiftByBoth(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames);
 
   MapBuilderOptions options_;
   std::vector<KeyFrame> key_frames_;
-  std::vector<std::vector<Segment2>> segments_;  // of the key frames, without depth images
+  std::vector<std::vector<Segment2>> segments_;  // of the key frames
+  std::vector<std::vector<LiftedPart>> parts_;   // of those, by their depth images
   std::unordered_set<int64_t> timestamps_;
   MapBuildStats stats_;
 };

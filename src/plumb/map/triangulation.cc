@@ -342,9 +342,9 @@ std::optional<double> NoiseFactor(const LiftedOfViews& lifted) {
 
 }  // namespace
 
-std::vector<std::vector<LiftedSegment>> TriangulateSegments(std::span<const SegmentView> views,
-                                                            const TriangulationOptions& options,
-                                                            const TriangulationProgress& progress) {
+std::vector<std::vector<TriangulatedSegment>> TriangulateSegments(
+    std::span<const SegmentView> views, const TriangulationOptions& options,
+    const TriangulationProgress& progress) {
   std::vector<Prepared> prepared;
   std::vector<Rigid3> poses;
   for (const SegmentView& view : views) {
@@ -373,11 +373,12 @@ std::vector<std::vector<LiftedSegment>> TriangulateSegments(std::span<const Segm
     });
   }
 
-  std::vector<std::vector<LiftedSegment>> out(views.size());
+  std::vector<std::vector<TriangulatedSegment>> out(views.size());
   for (size_t v = 0; v < views.size(); ++v) {
-    for (size_t i = 0; i < lifted[v].size(); ++i) {
-      if (!lifted[v][i]) continue;
-      out[v].push_back({views[v].segments[i], lifted[v][i]->segment_in_world, std::nullopt});
+    for (uint32_t i = 0; i < lifted[v].size(); ++i) {
+      if (const std::optional<Lifted>& segment = lifted[v][i]) {
+        out[v].push_back({i, segment->depth, segment->sigma, segment->segment_in_world});
+      }
     }
   }
   return out;

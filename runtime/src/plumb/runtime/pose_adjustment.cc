@@ -68,6 +68,7 @@ std::optional<MapPoses> AdjustMapPoses(const LineMap& map, std::span<const Rigid
       sighting.line = *segment.line;
       sighting.segment_normalized = {camera.Normalize(segment.segment_px.start),
                                      camera.Normalize(segment.segment_px.end)};
+      if (map.depth_source != DepthSource::kSensor) continue;  // views would be counted twice
       sighting.lifted_in_cam = Segment3{frame.cam_from_world * segment.segment_in_world.start,
                                         frame.cam_from_world * segment.segment_in_world.end};
       sighting.depth_sigma_m =

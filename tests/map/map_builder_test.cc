@@ -434,6 +434,17 @@ TEST(MapBuilderWithBoth, ViewsCorrectAWarpedSensor) {
   EXPECT_LT(MedianError(*both, scene), 0.01);  // views alone: 0.2 px at 3 m
   EXPECT_NEAR(builder.stats().depth_change, 0.02, 0.01);
   EXPECT_GT(builder.stats().num_averaged, 100u);
+  // Apart, frames have the corrected depth of their own image: exact but for the correction's
+  // noise, and the same whatever other frames' segments say of a single line.
+  const std::vector<KeyFrame> apart = builder.KeyFramesApart();
+  ASSERT_EQ(apart.size(), recording.frames.size());
+  LineMap apart_map;
+  apart_map.key_frames = apart;
+  EXPECT_LT(MedianError(apart_map, scene), 0.01);
+  ASSERT_EQ(apart[3].segments.size(), both->key_frames[3].segments.size());
+  EXPECT_NE(apart[3].segments[5].segment_in_world.start,
+            both->key_frames[3].segments[5].segment_in_world.start);
+  EXPECT_TRUE(apart[3].points.empty());
   for (const KeyFrame& frame : both->key_frames) {
     EXPECT_LT((frame.points[0].point_in_world - Eigen::Vector3f(0, 0, 3)).norm(), 0.01f);
   }

@@ -102,9 +102,13 @@ class KeyFrameReader {
   PointFrontEnd point_front_end_;
 };
 
-/// Fits the map's covariance to what its own key frames show.
-void Calibrate(LineMap* map) {
-  const CovarianceCalibration calibration = CalibrateCovariance(*map);
+/// Fits the map's covariance to what its own key frames show: with depth images to what they say
+/// each on its own, since depths averaged with other views' agree with those views by construction.
+void Calibrate(const MapBuilder& builder, LineMap* map) {
+  LineMap apart;
+  apart.key_frames = builder.KeyFramesApart();
+  const CovarianceCalibration calibration =
+      CalibrateCovariance(apart.key_frames.empty() ? *map : apart);
   if (calibration.num_errors < kMinCalibrationErrors) {
     PrintRemark("too few key frames see the same place, the covariance stays uncalibrated");
   }
@@ -245,7 +249,7 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   if (options.adjust_poses && !map.pose_change) {
     PrintRemark("no line is seen by two key frames, poses stay as they are");
   }
-  if (options.calibrate) Calibrate(&map);
+  if (options.calibrate) Calibrate(builder, &map);
   WriteMapOptions write_options;
   write_options.overwrite = true;
   if (const Status written = WriteMap(map, options.out, write_options); !written) {

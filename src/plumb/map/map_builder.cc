@@ -120,7 +120,7 @@ void MapBuilder::LiftByViews(const MapBuildProgress& progress, std::vector<KeyFr
 void MapBuilder::LiftBySensor(std::vector<KeyFrame>* key_frames) const {
   for (size_t k = 0; k < key_frames->size(); ++k) {
     KeyFrame& frame = (*key_frames)[k];
-    frame.segments = FuseLifts({frame.cam_from_world, segments_[k], parts_[k], {}}, {});
+    frame.segments = FuseLifts({frame.cam_from_world, segments_[k], parts_[k], {}}, depth_fit_);
   }
 }
 
@@ -133,6 +133,7 @@ void MapBuilder::LiftByBoth(const MapBuildProgress& progress, std::vector<KeyFra
   const DepthNoise& noise = options_.fusion.depth_noise;
   const std::optional<DepthFit> fit = FitDepthCorrection(CompareDepths(lifts), noise);
   if (!fit) return LiftBySensor(key_frames);
+  depth_fit_ = *fit;
   stats_.depth_change = fit->median_change;
   for (size_t k = 0; k < key_frames->size(); ++k) {
     KeyFrame& frame = (*key_frames)[k];
@@ -153,6 +154,7 @@ Result<LineMap> MapBuilder::Build(const MapBuildProgress& progress) {
   const auto triangulated = [&progress](double done) {
     if (progress) progress(kTriangulated * done);
   };
+  depth_fit_ = {};
   stats_.num_averaged = 0;
   stats_.depth_change = 0.0;
   switch (options_.depth_source) {
@@ -182,6 +184,16 @@ Result<LineMap> MapBuilder::Build(const MapBuildProgress& progress) {
       std::count_if(map.lines.begin(), map.lines.end(),
                     [](const MapLine& line) { return line.num_observing > 1; }));
   return map;
+}
+
+std::vector<KeyFrame> MapBuilder::KeyFramesApart() const {
+  std::vector<KeyFrame> apart;
+  if (options_.depth_source == DepthSource::kViews) return apart;
+  for (const KeyFrame& frame : key_frames_) {
+    apart.push_back({frame.timestamp_ns, frame.cam_from_world, frame.camera, {}, {}});
+  }
+  LiftBySensor(&apart);
+  return apart;
 }
 
 }  // namespace plumb

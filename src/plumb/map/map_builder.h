@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "plumb/base/result.h"
+#include "plumb/map/depth_correction.h"
 #include "plumb/map/depth_source.h"
 #include "plumb/map/depth_view.h"
 #include "plumb/map/lift.h"
@@ -78,19 +79,25 @@ class MapBuilder {
   /// @return kInvalidArgument when no key frame was added. A map without lines is not an error.
   Result<LineMap> Build(const MapBuildProgress& progress = {});
 
+  /// The key frames as of the last Build(), without points and lines, each segment with the depth
+  /// of its own depth image alone (corrected): no frame knows what another one saw. Empty without
+  /// depth images.
+  std::vector<KeyFrame> KeyFramesApart() const;
+
   /// Of the last Build(); before it, of the frames added so far.
   const MapBuildStats& stats() const { return stats_; }
 
  private:
   std::vector<std::vector<TriangulatedSegment>> Triangulate(const MapBuildProgress& progress) const;
   void LiftByViews(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames);
-  void LiftBySensor(std::vector<KeyFrame>* key_frames) const;
+  void LiftBySensor(std::vector<KeyFrame>* key_frames) const;  // with depth_fit_
   void LiftByBoth(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames);
 
   MapBuilderOptions options_;
   std::vector<KeyFrame> key_frames_;
   std::vector<std::vector<Segment2>> segments_;  // of the key frames
   std::vector<std::vector<LiftedPart>> parts_;   // of those, by their depth images
+  DepthFit depth_fit_;                           // of the last Build()
   std::unordered_set<int64_t> timestamps_;
   MapBuildStats stats_;
 };

@@ -51,6 +51,18 @@ class Schedule(unittest.TestCase):
         self.assertLess(last["seconds"], 12)
         self.assertEqual(rows[-1]["lr"], 0)
 
+    def test_bfloat16_is_the_default_only_where_the_cpu_multiplies_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for flags, expected in (("fpu sse2 avx2 fma", False), ("avx2 avx512_bf16 amx_tile", True), ("asimd bf16", True)):
+                with open(folder + "/cpuinfo", "w") as f:
+                    f.write("processor : 0\nflags : " + flags + "\n")
+                self.assertEqual(train.cpu_multiplies_bf16(folder + "/cpuinfo"), expected)
+            self.assertFalse(train.cpu_multiplies_bf16(folder + "/none"))
+        for has, expected in ((True, "bf16"), (False, "fp32")):
+            with mock.patch("train.cpu_multiplies_bf16", lambda: has):
+                self.assertEqual(a_run().args.precision, expected)
+                self.assertEqual(a_run("--precision", "bf16").args.precision, "bf16")
+
     def test_both_schedules_at_once_are_refused(self):
         with self.assertRaises(SystemExit):
             a_run("--end-after-minutes", "20", "--decay-epochs", "3")

@@ -26,6 +26,16 @@ STATE_VERSION = 2
 MAX_GRADIENT = 20.0
 
 
+def cpu_multiplies_bf16(cpuinfo="/proc/cpuinfo"):
+    """Whether this CPU has instructions for bfloat16; emulated it is several times slower than float32."""
+    try:
+        with open(cpuinfo) as f:
+            words = f.read().split()
+    except OSError:
+        return False
+    return not {"avx512_bf16", "amx_bf16", "bf16"}.isdisjoint(words)
+
+
 def parse_arguments(argv=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", required=True, help="folder with images/, labels.jsonl and manifest.json")
@@ -51,7 +61,7 @@ def parse_arguments(argv=None):
     parser.add_argument("--evaluate-minutes", type=float, default=10)
     parser.add_argument("--threads", type=int, default=os.cpu_count())
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
-    parser.add_argument("--precision", choices=("bf16", "fp32"), default="bf16")
+    parser.add_argument("--precision", choices=("bf16", "fp32"), help="default: bf16 where the device multiplies it, fp32 elsewhere")
     parser.add_argument("--loader", choices=("threads", "device"), help="where images are prepared; default: a GPU, but not a CPU, itself")
     parser.add_argument("--degrade", action="store_true", help="also gamma, blur, noise and JPEG")
     parser.add_argument("--mix", action="append", default=[], metavar="DIR:FRACTION", help="of every batch from another training folder")
@@ -65,6 +75,7 @@ def parse_arguments(argv=None):
         parser.error("--decay-epochs and --end-after-minutes exclude each other")
     if args.finish and (not args.end_after_minutes or args.minutes == float("inf")):
         parser.error("--finish needs --end-after-minutes and --minutes")
+    args.precision = args.precision or ("bf16" if args.device != "cpu" or cpu_multiplies_bf16() else "fp32")
     args.loader = args.loader or ("threads" if args.device == "cpu" else "device")
     return args
 

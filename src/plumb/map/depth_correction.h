@@ -26,7 +26,7 @@ struct DepthSample {
 /// w -> w + shift . (x, y, 1) + scale . (x, y, 1) w for an inverse depth w [1/m] on the ray
 /// (x, y, 1): offset and scale of a sensor's disparity, each with a tilt over the image. Covers a
 /// depth camera whose focal length, baseline or pose beside the colour camera is slightly off, and
-/// poses in another unit than the depth. Never below 0.01 / m.
+/// poses whose scale is off the depth's by a few percent. Never below 0.01 / m.
 struct DepthCorrection {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();  // [1/m]
   Eigen::Vector3d scale = Eigen::Vector3d::Zero();

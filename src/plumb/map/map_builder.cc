@@ -107,7 +107,8 @@ std::vector<std::vector<TriangulatedSegment>> MapBuilder::Triangulate(
   return TriangulateSegments(views, options_.triangulation, progress);
 }
 
-void MapBuilder::LiftByViews(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames) {
+void MapBuilder::LiftByViews(const MapBuildProgress& progress,
+                             std::vector<KeyFrame>* key_frames) const {
   const std::vector<std::vector<TriangulatedSegment>> by_views = Triangulate(progress);
   for (size_t k = 0; k < key_frames->size(); ++k) {
     for (const TriangulatedSegment& segment : by_views[k]) {

@@ -89,7 +89,7 @@ class MapBuilder {
 
  private:
   std::vector<std::vector<TriangulatedSegment>> Triangulate(const MapBuildProgress& progress) const;
-  void LiftByViews(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames);
+  void LiftByViews(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames) const;
   void LiftBySensor(std::vector<KeyFrame>* key_frames) const;  // with depth_fit_
   void LiftByBoth(const MapBuildProgress& progress, std::vector<KeyFrame>* key_frames);
 

@@ -8,6 +8,7 @@
 
 #include <Eigen/Geometry>
 
+#include "plumb/map/depth_hypotheses.h"
 #include "plumb/map/epipolar_index.h"
 
 namespace plumb {
@@ -23,12 +24,6 @@ constexpr size_t kMinScatters = 50;
 // Half of a hypothesis' variance comes from the segment's own noise, which its views share.
 constexpr double kExpectedScatter = 0.5;
 constexpr double kMaxLineSigmas = 3.0;  // between the lines of two segments that agree
-
-// Depths [m] of a segment's two ends according to one segment of another view.
-struct Hypothesis {
-  std::array<double, 2> depth{}, sigma{};
-  uint32_t view = 0, segment = 0;  // the other ones
-};
 
 struct Supporter {
   uint32_t view = 0, segment = 0;
@@ -49,6 +44,8 @@ struct Prepared {
   std::span<const Segment2> segments;
   std::vector<std::array<Eigen::Vector3d, 2>> rays;  // z = 1
   std::vector<Eigen::Vector3d> normals;              // of the planes through centre and segment
+  std::vector<double> pixels;                        // distance [px] over dot product with those
+  std::vector<double> lengths;                       // [px]
   std::vector<bool> usable;
 };
 
@@ -61,7 +58,11 @@ Prepared Prepare(const SegmentView& view, double min_length_px) {
     const double length = segment.Length();
     out.rays.push_back({view.camera.Normalize(segment.start).homogeneous(),
                         view.camera.Normalize(segment.end).homogeneous()});
-    out.normals.push_back(out.rays.back()[0].cross(out.rays.back()[1]));
+    const Eigen::Vector3d normal = out.rays.back()[0].cross(out.rays.back()[1]);
+    out.normals.push_back(normal);
+    out.pixels.push_back(1.0 /
+                         std::hypot(normal.x() / view.camera.fx, normal.y() / view.camera.fy));
+    out.lengths.push_back(length);
     out.usable.push_back(std::isfinite(length) && length >= min_length_px);
   }
   return out;
@@ -79,7 +80,7 @@ class PairTriangulator {
   }
 
   // Appends to hypotheses[i] those of the view's segment i.
-  void Append(std::vector<std::vector<Hypothesis>>* hypotheses) const {
+  void Append(std::vector<std::vector<DepthHypothesis>>* hypotheses) const {
     const EpipolarPencil pencil(-(rotation_.transpose() * translation_));
     std::vector<std::optional<EpipolarPencil::Interval>> spans(other_.segments.size());
     for (size_t k = 0; k < spans.size(); ++k) {
@@ -101,14 +102,14 @@ class PairTriangulator {
   }
 
  private:
-  std::optional<Hypothesis> Intersect(size_t i, uint32_t k) const {
+  std::optional<DepthHypothesis> Intersect(size_t i, uint32_t k) const {
     const Segment2& segment = other_.segments[k];
-    const double length = segment.Length();
+    const double length = other_.lengths[k];
     const Eigen::Vector2d direction = segment.Delta() / length;
     const Eigen::Vector3d& normal = other_.normals[k];
     const Camera& camera = *other_.camera;
-    const double pixels = 1.0 / std::hypot(normal.x() / camera.fx, normal.y() / camera.fy);
-    Hypothesis out;
+    const double pixels = other_.pixels[k];
+    DepthHypothesis out;
     out.view = other_index_;
     out.segment = k;
     double along[2];  // of the ends' images, along the other segment [px]
@@ -149,41 +150,11 @@ class PairTriangulator {
   Eigen::Vector3d translation_;
 };
 
-// Square of the larger difference of two hypotheses at the ends, in standard deviations.
-double SquareDifference(const Hypothesis& a, const Hypothesis& b) {
-  double largest = 0.0;
-  for (int end = 0; end < 2; ++end) {
-    const double difference = a.depth[end] - b.depth[end];
-    const double variance = a.sigma[end] * a.sigma[end] + b.sigma[end] * b.sigma[end];
-    largest = std::max(largest, difference * difference / variance);
-  }
-  return largest;
-}
-
-// Of every view's hypotheses, which follow each other, the one with the least square_of(): visited
-// with its index and square if that is below `max_square`.
-template <typename Square, typename Visit>
-void ForBestOfEachView(std::span<const Hypothesis> hypotheses, double max_square,
-                       const Square& square_of, const Visit& visit) {
-  for (size_t begin = 0, end = 0; begin < hypotheses.size(); begin = end) {
-    double best = max_square;
-    std::optional<size_t> best_index;
-    for (; end < hypotheses.size() && hypotheses[end].view == hypotheses[begin].view; ++end) {
-      const double square = square_of(hypotheses[end]);
-      if (square < best) {
-        best = square;
-        best_index = end;
-      }
-    }
-    if (best_index) visit(*best_index, best);
-  }
-}
-
-Hypothesis Average(std::span<const Hypothesis* const> members) {
-  Hypothesis mean;
+DepthHypothesis Average(std::span<const DepthHypothesis* const> members) {
+  DepthHypothesis mean;
   for (int end = 0; end < 2; ++end) {
     double sum = 0.0, information = 0.0;
-    for (const Hypothesis* member : members) {
+    for (const DepthHypothesis* member : members) {
       const double weight = 1.0 / (member->sigma[end] * member->sigma[end]);
       sum += weight * member->depth[end];
       information += weight;
@@ -195,9 +166,9 @@ Hypothesis Average(std::span<const Hypothesis* const> members) {
 }
 
 // Mean square deviation from the mean, in standard deviations. At least two members.
-double Scatter(const Hypothesis& mean, std::span<const Hypothesis* const> members) {
+double Scatter(const DepthHypothesis& mean, std::span<const DepthHypothesis* const> members) {
   double sum = 0.0;
-  for (const Hypothesis* member : members) {
+  for (const DepthHypothesis* member : members) {
     for (int end = 0; end < 2; ++end) {
       const double deviation = (member->depth[end] - mean.depth[end]) / member->sigma[end];
       sum += deviation * deviation;
@@ -207,22 +178,20 @@ double Scatter(const Hypothesis& mean, std::span<const Hypothesis* const> member
 }
 
 // Chooses among the hypotheses of one segment and averages those that agree.
-std::optional<Lifted> Choose(std::span<const Hypothesis> hypotheses,
+std::optional<Lifted> Choose(std::span<const DepthHypothesis> hypotheses,
                              const TriangulationOptions& options) {
   const double max_square = options.max_deviation * options.max_deviation;
+  DepthHypotheses table(hypotheses);
   std::vector<double> scores;
-  const Hypothesis* best = nullptr;
+  const DepthHypothesis* best = nullptr;
   double best_score = 0.0;
-  for (const Hypothesis& hypothesis : hypotheses) {
+  for (const DepthHypothesis& hypothesis : hypotheses) {
     double score = 0.0;
     uint32_t views = 1;
-    ForBestOfEachView(
-        hypotheses, max_square,
-        [&](const Hypothesis& other) { return SquareDifference(hypothesis, other); },
-        [&](size_t, double square) {
-          score += std::exp(-0.5 * square);
-          ++views;
-        });
+    table.ForBestOfEachView(hypothesis, max_square, [&](size_t, double square) {
+      score += std::exp(-0.5 * square);
+      ++views;
+    });
     scores.push_back(score);
     if (views >= options.min_views && score > best_score) {
       best_score = score;
@@ -231,19 +200,18 @@ std::optional<Lifted> Choose(std::span<const Hypothesis> hypotheses,
   }
   if (best == nullptr) return std::nullopt;
   for (size_t k = 0; k < hypotheses.size(); ++k) {
-    if (scores[k] > kClearly * best_score && SquareDifference(*best, hypotheses[k]) > max_square) {
+    if (scores[k] > kClearly * best_score &&
+        !SquareDifferenceBelow(max_square, *best, hypotheses[k])) {
       return std::nullopt;  // another depth is as good
     }
   }
 
-  Hypothesis mean = *best;
-  std::vector<const Hypothesis*> members;
+  DepthHypothesis mean = *best;
+  std::vector<const DepthHypothesis*> members;
   for (int step = 0; step < kAverageSteps; ++step) {
     members.clear();
-    ForBestOfEachView(
-        hypotheses, max_square,
-        [&mean](const Hypothesis& other) { return SquareDifference(mean, other); },
-        [&](size_t index, double) { members.push_back(&hypotheses[index]); });
+    table.ForBestOfEachView(mean, max_square,
+                            [&](size_t index, double) { members.push_back(&hypotheses[index]); });
     if (members.size() + 1 < options.min_views) return std::nullopt;
     mean = Average(members);
   }
@@ -252,7 +220,7 @@ std::optional<Lifted> Choose(std::span<const Hypothesis> hypotheses,
     if (!(mean.sigma[end] < limit)) return std::nullopt;
   }
   Lifted out{mean.depth, mean.sigma, Scatter(mean, members), {}, {}};
-  for (const Hypothesis* member : members) {
+  for (const DepthHypothesis* member : members) {
     out.supporters.push_back({member->view, member->segment});
   }
   return out;
@@ -307,7 +275,7 @@ LiftedOfViews LiftAll(std::span<const Prepared> views,
   LiftedOfViews lifted(views.size());
   for (uint32_t v = 0; v < views.size(); ++v) {
     const Prepared& view = views[v];
-    std::vector<std::vector<Hypothesis>> hypotheses(view.segments.size());
+    std::vector<std::vector<DepthHypothesis>> hypotheses(view.segments.size());
     for (const uint32_t other : neighbours[v]) {
       PairTriangulator(view, views[other], other, options).Append(&hypotheses);
     }

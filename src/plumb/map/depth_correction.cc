@@ -7,6 +7,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "plumb/base/median.h"
+
 namespace plumb {
 namespace {
 
@@ -37,12 +39,6 @@ double Deviation(const DepthSample& sample, const DepthCorrection& correction) {
 double Variance(const DepthSample& sample, const DepthNoise& noise, double factor) {
   const double sensor = factor * noise.InverseSigmaAt(sample.sensor);
   return sensor * sensor + sample.views_sigma * sample.views_sigma;
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 DepthCorrection Fit(std::span<const DepthSample> samples, const DepthNoise& noise) {
@@ -117,7 +113,7 @@ std::optional<DepthFit> FitDepthCorrection(std::span<const DepthSample> samples,
   for (const DepthSample& sample : samples) {
     change.push_back(std::abs(sample.sensor / out.correction(sample.ray, sample.sensor) - 1.0));
   }
-  out.median_change = Median(std::move(change));
+  out.median_change = Median(change);
   return out;
 }
 

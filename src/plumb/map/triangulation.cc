@@ -8,6 +8,7 @@
 
 #include <Eigen/Geometry>
 
+#include "plumb/base/median.h"
 #include "plumb/map/depth_hypotheses.h"
 #include "plumb/map/epipolar_index.h"
 
@@ -303,9 +304,7 @@ std::optional<double> NoiseFactor(const LiftedOfViews& lifted) {
     }
   }
   if (scatter.size() < kMinScatters) return std::nullopt;
-  const auto middle = scatter.begin() + static_cast<std::ptrdiff_t>(scatter.size() / 2);
-  std::nth_element(scatter.begin(), middle, scatter.end());
-  return std::sqrt(*middle / kExpectedScatter);
+  return std::sqrt(Median(scatter) / kExpectedScatter);
 }
 
 }  // namespace

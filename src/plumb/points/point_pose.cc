@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <opencv2/calib3d.hpp>
 
+#include "plumb/base/median.h"
 #include "plumb/geometry/line_projection.h"
 
 namespace plumb {
@@ -59,9 +60,7 @@ Rigid3 RefinePointPose(const Camera& camera, std::span<const PointCorrespondence
       }
     }
     if (terms.empty()) return pose;
-    const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-    std::nth_element(squares.begin(), middle, squares.end());
-    const double scale = std::max(*middle / kMedianChiSquare2, kMinScale);
+    const double scale = std::max(Median(squares) / kMedianChiSquare2, kMinScale);
     Matrix6d information = 1e-6 * Matrix6d::Identity();
     Vector6d gradient = Vector6d::Zero();
     for (const PointTerm& term : terms) {

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "plumb/base/median.h"
 #include "plumb/base/solve6.h"
 #include "plumb/geometry/line_projection.h"
 
@@ -133,9 +134,7 @@ PointAccumulator::Equations PointAccumulator::Accumulate(const Camera& camera,
   }
   Equations out;
   if (residuals_.empty()) return out;
-  const auto middle = squares_.begin() + static_cast<std::ptrdiff_t>(squares_.size() / 2);
-  std::nth_element(squares_.begin(), middle, squares_.end());
-  const double scale = std::max(*middle / kMedianOfChiSquare2, kMinPointScale);
+  const double scale = std::max(Median(squares_) / kMedianOfChiSquare2, kMinPointScale);
   for (const Residual& r : residuals_) {
     const double q = 1.0 + r.square / (scale * kPointRobustSigmas * kPointRobustSigmas);
     const double weight = r.weight / (scale * q * q);

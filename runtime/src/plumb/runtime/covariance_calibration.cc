@@ -8,6 +8,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "plumb/base/median.h"
 #include "plumb/map/map_index.h"
 #include "plumb/refine/uncertainty.h"
 #include "plumb/runtime/covariance_factor.h"
@@ -106,9 +107,7 @@ CovarianceCalibration CalibrateCovariance(const LineMap& map) {
     for (size_t i = 0; i < errors.size(); ++i) {
       logs[i] = std::log(errors[i].ratio / (1.0 + shape * errors[i].distance));
     }
-    const auto middle = logs.begin() + static_cast<ptrdiff_t>(logs.size() / 2);
-    std::nth_element(logs.begin(), middle, logs.end());
-    const double median = *middle;
+    const double median = Median(logs);
     double deviation = 0.0;
     for (const double value : logs) deviation += std::abs(value - median);
     if (deviation >= least) continue;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "plumb/base/median.h"
 #include "plumb/geometry/line_projection.h"
 #include "plumb/map/depth_view.h"
 
@@ -16,13 +17,6 @@ namespace {
 constexpr double kDepthSigmaFactor = 5.0;
 // Of a segment's deviation, round by round.
 constexpr std::array kPixelSigmaFactors = {4.0, 2.0, 1.0, 1.0};
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 bool IsUsed(const LineMap& map, const LiftedSegment& segment) {
   return segment.line && map.lines[*segment.line].num_observing > 1;
@@ -44,7 +38,7 @@ double MedianDistance(const LineMap& map, std::span<const Rigid3> poses,
                                  std::abs(image->SignedDistance(segment.segment_px.end))));
     }
   }
-  return Median(std::move(distances));
+  return Median(distances);
 }
 
 }  // namespace
@@ -129,7 +123,7 @@ PoseChange MedianChange(std::span<const Rigid3> priors, std::span<const Rigid3> 
     position_m.push_back(distance.position_m);
     rotation_rad.push_back(distance.rotation_rad);
   }
-  return {Median(std::move(position_m)), Median(std::move(rotation_rad))};
+  return {Median(position_m), Median(rotation_rad)};
 }
 
 }  // namespace plumb

@@ -43,6 +43,7 @@ void WriteUnchecked(const LineMap& map, const std::string& directory) {
   manifest.covariance_factor = map.covariance_factor;
   manifest.covariance_growth = map.covariance_growth;
   manifest.pose_change = map.pose_change;
+  manifest.camera_correction = map.camera_correction;
   manifest.origin = origin;
   std::filesystem::create_directories(directory + "/tiles");
   Spill(directory + "/manifest.json", WriteManifest(manifest));
@@ -82,6 +83,9 @@ TEST_F(MapFileTest, KeepsEverythingWithinFloatOfTheOrigin) {
   ASSERT_TRUE(read->pose_change);
   EXPECT_EQ(read->pose_change->position_m, map.pose_change->position_m);
   EXPECT_EQ(read->pose_change->rotation_rad, map.pose_change->rotation_rad);
+  ASSERT_TRUE(read->camera_correction);
+  EXPECT_EQ(read->camera_correction->given, map.camera_correction->given);
+  EXPECT_EQ(read->camera_correction->corrected, map.camera_correction->corrected);
   EXPECT_EQ(read->sighting_begin, map.sighting_begin);
   ASSERT_EQ(read->lines.size(), map.lines.size());
   for (size_t i = 0; i < map.lines.size(); ++i) {
@@ -282,6 +286,14 @@ TEST_F(MapFileTest, RefusesHostileManifests) {
       {"half a change of poses", "position_m", "position"},
       {"a change of poses that is text", "\"rotation_rad\": 0.002", "\"rotation_rad\": \"2\""},
       {"a negative change of poses", "\"position_m\": 0.004", "\"position_m\": -0.004"},
+      {"a camera without the corrected one", "\"corrected\"", "\"other\""},
+      {"a camera without a number", "\"fx\": 523.7", "\"fx\": null"},
+      {"a camera of no focal length", "\"fx\": 523.7", "\"fx\": 0.0"},
+      {"a camera of no size", "\"width\": 640", "\"width\": 0"},
+      {"a camera of a huge size", "\"width\": 640", "\"width\": 4294967936"},
+      {"a lens of another kind", "\"RADTAN\"", "\"MIRROR\""},
+      {"a lens of too few numbers", "0.01,", ""},
+      {"a lens of text", "0.01,", "\"0.01\","},
       {"a growth that is null", "\"covariance_growth\": 0.75", "\"covariance_growth\": null"},
       {"a depth of another kind", "\"views\"", "\"sonar\""},
       {"a depth that is a number", "\"views\"", "7"},

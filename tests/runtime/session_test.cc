@@ -418,6 +418,32 @@ TEST_F(SessionTest, DestructionWithoutAnyFrameReturns) {
   Start(Blocking(SessionMode::kStream));
 }
 
+TEST(SessionWithACorrectedCamera, TakesItsFramesByTheCorrectedOne) {
+  Room& room = TheRoom();
+  LineMap map = room.map;
+  ImageCamera given = room.scene.camera;
+  given.pinhole.fx *= 1.02;
+  given.pinhole.fy *= 1.02;
+  map.camera_correction = CameraCorrection{given, room.scene.camera};
+  const MapIndex index(map);
+  const auto refine = [&room](const MapIndex& of_map, const ImageCamera& camera) {
+    auto session = Session::Create(of_map, CreateLsdDetector(), {});
+    SessionFrame frame = room.Frame(0, PriorError());
+    frame.camera = camera;
+    EXPECT_TRUE(session && (*session)->Submit(frame));
+    FrameResult result;
+    EXPECT_TRUE((*session)->Wait(60 * kSecondNs, &result));
+    return result.refined.cam_from_world;
+  };
+  const Rigid3 right = refine(room.index, room.scene.camera);
+  const Rigid3 corrected = refine(index, given), wrong = refine(room.index, given);
+  EXPECT_EQ(corrected.translation, right.translation);
+  EXPECT_EQ(corrected.rotation.coeffs(), right.rotation.coeffs());
+  EXPECT_GT((wrong.Center() - right.Center()).norm(), 0.01);
+  // Another camera than the one that took the key frames is taken as it is.
+  EXPECT_EQ(refine(index, room.scene.camera).translation, right.translation);
+}
+
 TEST_F(SessionTest, EqualFramesGiveEqualBytes) {
   Rigid3 poses[2];
   for (Rigid3& pose : poses) {

@@ -29,6 +29,10 @@ inline LineMap MakeRandomMap(const RandomMapSize& size, unsigned seed,
   map.covariance_factor = 2.25;
   map.covariance_growth = 0.75;
   map.pose_change = PoseChange{0.004, 0.002};
+  const Camera given{525.5, 525.0, 320.0, 240.0, 640, 480};
+  const Camera corrected{523.7, 523.2, 319.6, 239.9, 640, 480};
+  map.camera_correction =
+      CameraCorrection{given, {corrected, {LensModel::kRadTan, {0.01, -0.05, 0.001, 0.0}}}};
   for (uint32_t k = 0; k < size.key_frames; ++k) {
     KeyFrame key_frame;
     key_frame.timestamp_ns = 1'000'000'000LL + 33'333'333LL * k;

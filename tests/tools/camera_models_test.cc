@@ -34,10 +34,10 @@ class CameraModels : public ::testing::Test {
                                         camera + " --out " + (dir_ / name));
     ASSERT_EQ(run.exit_code, 0) << run.err;
   }
-  void Build(const std::string& name) {
-    const ProgramRun run =
-        RunPlumbline("map build --sequence " + (dir_ / name) + " --frames " +
-                     (dir_ / (name + "/splits/map.txt")) + " --model lsd --out " + (dir_ / "map"));
+  void Build(const std::string& name, const std::string& extra = "") {
+    const ProgramRun run = RunPlumbline("map build --sequence " + (dir_ / name) + " --frames " +
+                                        (dir_ / (name + "/splits/map.txt")) +
+                                        " --model lsd --out " + (dir_ / "map") + " " + extra);
     ASSERT_EQ(run.exit_code, 0) << run.err;
   }
   Errors Refine(const std::string& name, const std::string& extra = "") {
@@ -92,6 +92,33 @@ TEST_F(CameraModels, AMapServesCamerasOfEveryKind) {
   EXPECT_LT(errors.p90_cm, 0.5);
   // Points too: their places and depths are those of the distorted images.
   EXPECT_LT(Refine("radtan", "--points opencv").p90_cm, 0.5);
+}
+
+// The images have a lens that camera.json does not know: key frames show it, queries gain.
+TEST_F(CameraModels, ALensThatIsNotGivenIsFound) {
+  const std::string room = dir_ / "room";
+  const ProgramRun synth = RunPlumbline(
+      "synth --seed 2 --frames 36 --sweep 60 --map-every 2 --width 480 --height 360 --focal 360 "
+      "--samples 1 --camera-model RADTAN --distortion=0.03,-0.06,0,0 --out " +
+      room);
+  ASSERT_EQ(synth.exit_code, 0) << synth.err;
+  json camera = json::parse(ReadAll(room + "/camera.json"));
+  camera["model"] = "PINHOLE";
+  camera.erase("distortion_coefficients");
+  dir_.Write("room/camera.json", camera.dump());
+
+  Build("room", "--camera given");
+  const json given_info = json::parse(RunPlumbline("map info --json " + (dir_ / "map")).out);
+  EXPECT_FALSE(given_info.contains("camera_lens"));
+  const Errors given = Refine("room");
+  Build("room");
+  const json info = json::parse(RunPlumbline("map info --json " + (dir_ / "map")).out);
+  ASSERT_EQ(info["camera_lens"], "RADTAN");
+  EXPECT_NEAR(info["camera_fx_fy_cx_cy"][0].get<double>(), 360.0, 2.0);
+  EXPECT_GT(info["camera_shift_px"].get<double>(), 1.0);
+  const Errors found = Refine("room");
+  EXPECT_LT(found.median_cm, 0.7 * given.median_cm);
+  EXPECT_LT(found.median_deg, 0.7 * given.median_deg);
 }
 
 TEST_F(CameraModels, TheOtherCommandsTakeThem) {

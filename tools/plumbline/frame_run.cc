@@ -236,6 +236,11 @@ Outcome OpenFrameRun(const FrameRunOptions& options, FrameRun* out_run) {
   if (!map) return FailureFrom(map.error());
   out_run->map = *std::move(map);
   out_run->index = std::make_unique<MapIndex>(out_run->map);
+  Result<Rectifier> rectifier =
+      Rectifier::Create(out_run->map.Corrected(out_run->sequence.rectifier.image_camera()));
+  if (!rectifier) return FailureFrom(rectifier.error());
+  out_run->sequence.rectifier = *std::move(rectifier);
+  out_run->sequence.camera = out_run->sequence.rectifier.ideal();
   if (Outcome failed = ChooseDetector(options, &out_run->detector)) return failed;
   out_run->detector_name = out_run->detector->Name();
   out_run->device = out_run->detector->DeviceName();

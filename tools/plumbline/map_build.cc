@@ -11,6 +11,7 @@
 #include "plumb/features/segment_refiner.h"
 #include "plumb/map/map_builder.h"
 #include "plumb/map/map_file.h"
+#include "plumb/runtime/camera_calibration.h"
 #include "plumb/runtime/covariance_calibration.h"
 #include "plumb/runtime/pose_adjustment.h"
 #include "tools/datasets/image_file.h"
@@ -33,6 +34,7 @@ struct MapBuildOptions {
   DetectorOptions detector;
   std::string depth;   // empty: both for a sequence, views for a COLMAP model
   std::string points;  // empty: opencv where there is depth
+  std::string camera;  // empty: refined for a sequence, given for a COLMAP model
   bool calibrate = true;
   bool adjust_poses = false;
   std::string pose_sigma = "0.5,0.1";  // cm, deg
@@ -43,6 +45,7 @@ struct MapBuildOptions {
     return *DepthSourceOf(depth);
   }
   bool WithDepth() const { return Source() != DepthSource::kViews; }
+  bool RefinesCamera() const { return camera.empty() ? colmap.empty() : camera == "refined"; }
   bool WithPoints() const { return points.empty() ? WithDepth() : points == "opencv"; }
 };
 
@@ -53,18 +56,19 @@ struct LoadedKeyFrame {
   KeyFrameInput input;
 };
 
-/// Reads the images of key frames, detects and refines their segments.
+/// Reads the images of key frames, detects and refines their segments. Detects once however often
+/// a frame is read.
 class KeyFrameReader {
  public:
-  KeyFrameReader(const KeyFrameSource& source, LineDetector* detector, bool with_depth,
-                 bool with_points)
+  /// `source` may get other rectifiers of the same images on the way.
+  KeyFrameReader(const KeyFrameSource& source, LineDetector* detector, bool with_depth)
       : source_(source),
         detector_(detector),
         with_depth_(with_depth),
-        with_points_(with_points),
-        refiner_(SegmentRefinerOptions{}) {}
+        refiner_(SegmentRefinerOptions{}),
+        detected_(source.frames.size()) {}
 
-  Outcome Read(size_t index, LoadedKeyFrame* out) {
+  Outcome Read(size_t index, bool with_points, LoadedKeyFrame* out) {
     const SequenceFrame& frame = source_.frames[index];
     const Rectifier& rectifier = source_.rectifiers[source_.rectifier_of[index]];
     RgbdImages images;
@@ -75,10 +79,13 @@ class KeyFrameReader {
     }
     out->depth = images.depth;
 
-    Result<std::vector<Segment2>> segments =
-        DetectRefined(ViewOf(images.color), rectifier, detector_, &refiner_);
-    if (!segments) return FailureFrom(segments.error());
-    out->segments = *std::move(segments);
+    const ImageView image = ViewOf(images.color);
+    if (!detected_[index]) {
+      Result<std::vector<Segment2>> detected = detector_->Detect(image);
+      if (!detected) return FailureFrom(detected.error());
+      detected_[index] = *std::move(detected);
+    }
+    out->segments = refiner_.Refine(image, *detected_[index], &rectifier);
     KeyFrameInput& input = out->input;
     input.timestamp_ns = frame.timestamp_ns;
     input.cam_from_world = *frame.cam_from_world;
@@ -86,7 +93,7 @@ class KeyFrameReader {
     input.rectifier = &rectifier;
     input.segments = out->segments;
     if (with_depth_) input.depth = ViewOfDepth(out->depth, source_.depth_scale);
-    if (!with_points_) return std::nullopt;
+    if (!with_points) return std::nullopt;
     Result<std::vector<MapPoint>> points =
         point_front_end_.KeyFramePoints(images.color, rectifier, input.cam_from_world, input.depth);
     if (!points) return FailureFrom(points.error());
@@ -97,10 +104,49 @@ class KeyFrameReader {
  private:
   const KeyFrameSource& source_;
   LineDetector* detector_;
-  bool with_depth_, with_points_;
+  bool with_depth_;
   SegmentRefiner refiner_;
   PointFrontEnd point_front_end_;
+  std::vector<std::optional<std::vector<Segment2>>> detected_;  // in the images as taken
 };
+
+Outcome AddKeyFrames(const KeyFrameSource& source, const char* label, bool with_points,
+                     KeyFrameReader* reader, MapBuilder* builder) {
+  ProgressBar progress(label, source.frames.size());
+  for (size_t k = 0; k < source.frames.size(); ++k) {
+    if (Outcome interrupted = CheckInterrupt()) return interrupted;
+    LoadedKeyFrame loaded;
+    if (Outcome failed = reader->Read(k, with_points, &loaded)) return failed;
+    if (const Status added = builder->AddKeyFrame(std::move(loaded.input)); !added) {
+      return Failure{kExitBadData, added.error().message};
+    }
+    progress.Advance();
+  }
+  return std::nullopt;
+}
+
+/// Corrects the source's camera by what a first map shows, of its depth images alone if it has any.
+Outcome RefineCamera(const MapBuildOptions& options, KeyFrameReader* reader, KeyFrameSource* source,
+                     std::optional<CameraCorrection>* out_correction) {
+  if (!options.RefinesCamera()) return std::nullopt;
+  if (source->rectifiers.size() != 1) {
+    PrintRemark("--camera refined: the model has " + std::to_string(source->rectifiers.size()) +
+                " cameras, they are taken as given");
+    return std::nullopt;
+  }
+  MapBuilderOptions first;
+  first.depth_source = options.WithDepth() ? DepthSource::kSensor : DepthSource::kViews;
+  MapBuilder builder(first);
+  if (Outcome failed = AddKeyFrames(*source, "camera", false, reader, &builder)) return failed;
+  const Result<LineMap> map = builder.Build();
+  if (!map) return FailureFrom(map.error());
+  *out_correction = CalibrateCamera(*map, source->rectifiers[0]);
+  if (!*out_correction) return std::nullopt;
+  Result<Rectifier> corrected = Rectifier::Create((*out_correction)->corrected);
+  if (!corrected) return FailureFrom(corrected.error());
+  source->rectifiers[0] = *std::move(corrected);
+  return std::nullopt;
+}
 
 /// Fits the map's covariance to what its own key frames show: with depth images to what they say
 /// each on its own, since depths averaged with other views' agree with those views by construction.
@@ -159,6 +205,11 @@ Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, const
           100.0 * stats.depth_change, stats.num_averaged);
       report += text;
     }
+    if (built.map.camera_correction) {
+      std::snprintf(text, sizeof(text), "camera corrected by up to %.2f px\n",
+                    LargestShiftPx(*built.map.camera_correction));
+      report += text;
+    }
     if (change) {
       std::snprintf(text, sizeof(text),
                     "poses adjusted by %.2f cm, %.3f deg (median); segments lie %.2f px from their "
@@ -180,6 +231,9 @@ Outcome Report(const MapBuildOptions& options, const MapBuildStats& stats, const
   report["filtered"] = stats.num_filtered;
   report["lines"] = stats.num_lines;
   report["multi_view_lines"] = stats.num_multi_view_lines;
+  if (built.map.camera_correction) {
+    report["camera_shift_px"] = Rounded(LargestShiftPx(*built.map.camera_correction), 3);
+  }
   if (change) {
     report["poses_adjusted_cm"] = Rounded(cm, 3);
     report["poses_adjusted_deg"] = Rounded(deg, 4);
@@ -226,26 +280,21 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   std::unique_ptr<LineDetector> detector;
   if (Outcome failed = CreateDetector(options.detector, &detector)) return failed;
 
+  KeyFrameReader reader(source, detector.get(), options.WithDepth());
+  std::optional<CameraCorrection> correction;
+  if (Outcome failed = RefineCamera(options, &reader, &source, &correction)) return failed;
   MapBuilderOptions builder_options;
   builder_options.detector = detector->Name();
   builder_options.depth_source = options.Source();
   MapBuilder builder(builder_options);
-  {
-    KeyFrameReader reader(source, detector.get(), options.WithDepth(), options.WithPoints());
-    ProgressBar progress("key frames", source.frames.size());
-    for (size_t k = 0; k < source.frames.size(); ++k) {
-      if (Outcome interrupted = CheckInterrupt()) return interrupted;
-      LoadedKeyFrame loaded;
-      if (Outcome failed = reader.Read(k, &loaded)) return failed;
-      if (const Status added = builder.AddKeyFrame(std::move(loaded.input)); !added) {
-        return Failure{kExitBadData, added.error().message};
-      }
-      progress.Advance();
-    }
+  if (Outcome failed =
+          AddKeyFrames(source, "key frames", options.WithPoints(), &reader, &builder)) {
+    return failed;
   }
   Result<AdjustedMap> built = Fuse(options, bundle_options, &builder);
   if (!built) return FailureFrom(built.error());
   LineMap& map = built->map;
+  map.camera_correction = correction;
   if (options.adjust_poses && !map.pose_change) {
     PrintRemark("no line is seen by two key frames, poses stay as they are");
   }
@@ -290,6 +339,13 @@ void AddMapBuild(CLI::App& map, PendingRun& pending) {
                         "opencv: keep SIFT points of every key frame for replay --points; or none "
                         "(default: opencv, with --depth views none)")
             ->check(CLI::IsMember({"none", "opencv"}));
+        command
+            .add_option("--camera", options.camera,
+                        "given: the intrinsics as they are; refined: corrected by what the views "
+                        "say, where that holds for key frames left out, and queries of the same "
+                        "camera are taken by the corrected ones (default: refined, with --colmap "
+                        "given)")
+            ->check(CLI::IsMember({"given", "refined"}));
         command.add_flag(
             "--calibrate,!--no-calibrate", options.calibrate,
             "Fit the covariance of poses to how well the key frames agree with each other (on by "

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plumb/map/map_file.h"
+#include "plumb/runtime/camera_calibration.h"
 #include "tools/metrics/percentile.h"
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/json_report.h"
@@ -65,6 +66,16 @@ Json Describe(const std::string& path, const LineMap& map) {
   report["points"] = num_points;
   report["covariance_factor"] = map.covariance_factor;
   report["covariance_growth"] = map.covariance_growth;
+  if (map.camera_correction) {
+    const ImageCamera& camera = map.camera_correction->corrected;
+    report["camera_shift_px"] = Rounded(LargestShiftPx(*map.camera_correction), 3);
+    report["camera_fx_fy_cx_cy"] = {Rounded(camera.pinhole.fx, 3), Rounded(camera.pinhole.fy, 3),
+                                    Rounded(camera.pinhole.cx, 3), Rounded(camera.pinhole.cy, 3)};
+    report["camera_lens"] = ToString(camera.lens.model);
+    Json coefficients = Json::array();
+    for (const double value : camera.lens.coefficients) coefficients.push_back(Rounded(value, 6));
+    report["camera_distortion_coefficients"] = std::move(coefficients);
+  }
   if (map.pose_change) {
     report["poses_adjusted_cm"] = Rounded(100.0 * map.pose_change->position_m, 3);
     report["poses_adjusted_deg"] =

@@ -281,7 +281,9 @@ typedef struct plumb_frame {
   uint32_t width_px, height_px;
   const uint8_t* planes[3];
   int64_t row_stride_bytes[3];
-  double fx, fy, cx, cy;     /* of the image as it is, with the lens below [px] */
+  /* Of the image as it is, with the lens below [px]. The camera of the map's key frames is taken as
+   * the map corrects it, if it does. */
+  double fx, fy, cx, cy;
   int64_t timestamp_ns;      /* of the caller's clock; strictly increasing within a session */
   uint64_t user_tag;         /* comes back in the result */
   int32_t pose_convention;   /* PLUMB_POSE_*; required */

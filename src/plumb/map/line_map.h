@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "plumb/geometry/camera.h"
+#include "plumb/geometry/camera_correction.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
 #include "plumb/map/depth_source.h"
@@ -83,6 +84,15 @@ struct LineMap {
   double covariance_factor = kUncalibratedFactor, covariance_growth = 0.0;
   /// Set when the key frames' poses were adjusted together with the lines, from those given.
   std::optional<PoseChange> pose_change;
+  /// Set when the key frames' one camera was corrected; the key frames are of the corrected one.
+  std::optional<CameraCorrection> camera_correction;
+
+  /// What to take a camera for: the corrected one if `given` is the one that took the key frames.
+  ImageCamera Corrected(const ImageCamera& given) const {
+    return camera_correction && IsSameCamera(camera_correction->given, given)
+               ? camera_correction->corrected
+               : given;
+  }
 
   std::span<const LineSighting> SightingsOf(uint32_t line) const {
     return std::span(sightings).subspan(sighting_begin[line],

@@ -166,6 +166,15 @@ Status CheckMap(const LineMap& map) {
       !(is_length(map.pose_change->position_m) && is_length(map.pose_change->rotation_rad))) {
     return Error{ErrorCode::kInvalidArgument, "The change of the poses is not a number from 0"};
   }
+  if (map.camera_correction) {
+    for (const ImageCamera* camera :
+         {&map.camera_correction->given, &map.camera_correction->corrected}) {
+      const Result<Rectifier> rectifier = Rectifier::Create(*camera);
+      if (rectifier) continue;
+      return Error{ErrorCode::kInvalidArgument,
+                   "The correction of the camera: " + rectifier.error().message};
+    }
+  }
   if (map.detector.size() > kMaxDetectorBytes || !IsUtf8(map.detector)) {
     return Error{ErrorCode::kInvalidArgument,
                  "The detector's name is longer than 1024 bytes or not UTF-8"};

@@ -169,6 +169,7 @@ Status WriteMap(const LineMap& map, const std::string& directory, const WriteMap
   decoded->covariance_factor = map.covariance_factor;
   decoded->covariance_growth = map.covariance_growth;
   decoded->pose_change = map.pose_change;
+  decoded->camera_correction = map.camera_correction;
   if (Status status = CheckMap(*decoded); !status) return status;
 
   MapManifest manifest = DescribeTiles(tiles);
@@ -177,6 +178,7 @@ Status WriteMap(const LineMap& map, const std::string& directory, const WriteMap
   manifest.covariance_factor = map.covariance_factor;
   manifest.covariance_growth = map.covariance_growth;
   manifest.pose_change = map.pose_change;
+  manifest.camera_correction = map.camera_correction;
   manifest.origin = origin;
 
   const size_t end = directory.find_last_not_of('/');
@@ -221,6 +223,7 @@ Result<LineMap> ReadMap(const std::string& directory) {
   map->covariance_factor = manifest->covariance_factor;
   map->covariance_growth = manifest->covariance_growth;
   map->pose_change = manifest->pose_change;
+  map->camera_correction = manifest->camera_correction;
   if (const Status status = CheckMap(*map); !status) {
     return in_file({ErrorCode::kCorruptData, status.error().message});
   }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 namespace plumb {
 namespace {
@@ -17,6 +18,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kMaxDepth = 8;
 constexpr double kMaxOrigin = 1e7;
+constexpr uint64_t kMaxSidePx = 65536;
 constexpr std::string_view kChecksumKey = "  \"xxh3\": \"";
 constexpr std::string_view kEnd = "\"\n}\n";
 
@@ -115,6 +117,56 @@ Result<TileEntry> ParseTile(const Json& tile, TileKind kind) {
   return TileEntry{*file, *records, *bytes, *xxh3};
 }
 
+Json CameraJson(const ImageCamera& camera) {
+  const Camera& pinhole = camera.pinhole;
+  return {{"width", pinhole.width_px},
+          {"height", pinhole.height_px},
+          {"fx", pinhole.fx},
+          {"fy", pinhole.fy},
+          {"cx", pinhole.cx},
+          {"cy", pinhole.cy},
+          {"lens", ToString(camera.lens.model)},
+          {"coefficients", camera.lens.coefficients}};
+}
+
+/// All members as CameraJson() writes them; whether it is a camera, CheckMap() says.
+std::optional<ImageCamera> ParseCamera(const Json* json) {
+  if (json == nullptr) return std::nullopt;
+  ImageCamera camera;
+  Camera& pinhole = camera.pinhole;
+  const std::pair<const char*, int*> sides[] = {{"width", &pinhole.width_px},
+                                                {"height", &pinhole.height_px}};
+  for (const auto& [key, value] : sides) {
+    const auto side = CountOf(*json, key);
+    if (!side || *side > kMaxSidePx) return std::nullopt;
+    *value = static_cast<int>(*side);
+  }
+  const std::pair<const char*, double*> numbers[] = {
+      {"fx", &pinhole.fx}, {"fy", &pinhole.fy}, {"cx", &pinhole.cx}, {"cy", &pinhole.cy}};
+  for (const auto& [key, value] : numbers) {
+    const auto number = NumberOf(Member(*json, key));
+    if (!number) return std::nullopt;
+    *value = *number;
+  }
+  const auto lens = TextOf(*json, "lens");
+  const Json* coefficients = Member(*json, "coefficients");
+  const std::array models = {LensModel::kNone, LensModel::kRadTan, LensModel::kKannalaBrandt};
+  const auto* const model = std::find_if(models.begin(), models.end(), [&](LensModel known) {
+    return lens && *lens == ToString(known);
+  });
+  if (model == models.end() || coefficients == nullptr || !coefficients->is_array() ||
+      coefficients->size() != camera.lens.coefficients.size()) {
+    return std::nullopt;
+  }
+  camera.lens.model = *model;
+  for (size_t i = 0; i < camera.lens.coefficients.size(); ++i) {
+    const auto number = NumberOf(&(*coefficients)[i]);
+    if (!number) return std::nullopt;
+    camera.lens.coefficients[i] = *number;
+  }
+  return camera;
+}
+
 Result<MapManifest> ParseMembers(const Json& root) {
   const auto schema = TextOf(root, "schema");
   if (!schema) return Corrupt("has no schema");
@@ -148,6 +200,13 @@ Result<MapManifest> ParseMembers(const Json& root) {
     const auto rotation = NumberOf(Member(*member, "rotation_rad"));
     if (!position || !rotation) return Corrupt("has a pose_change without its two numbers");
     manifest.pose_change = PoseChange{*position, *rotation};
+  }
+
+  if (const Json* member = Member(root, "camera")) {  // only where it was corrected
+    const auto given = ParseCamera(Member(*member, "given"));
+    const auto corrected = ParseCamera(Member(*member, "corrected"));
+    if (!given || !corrected) return Corrupt("has a camera that is not one, given and corrected");
+    manifest.camera_correction = CameraCorrection{*given, *corrected};
   }
 
   const Json* origin = Member(root, "origin");
@@ -206,6 +265,10 @@ std::string WriteManifest(const MapManifest& manifest) {
   if (manifest.pose_change) {
     root["pose_change"] = {{"position_m", manifest.pose_change->position_m},
                            {"rotation_rad", manifest.pose_change->rotation_rad}};
+  }
+  if (manifest.camera_correction) {
+    root["camera"] = {{"given", CameraJson(manifest.camera_correction->given)},
+                      {"corrected", CameraJson(manifest.camera_correction->corrected)}};
   }
   root["origin"] = {manifest.origin.x(), manifest.origin.y(), manifest.origin.z()};
   root["tiles"] = std::move(tiles);

@@ -30,6 +30,7 @@ struct MapManifest {
   DepthSource depth_source = DepthSource::kSensor;
   double covariance_factor = kUncalibratedFactor, covariance_growth = 0.0;
   std::optional<PoseChange> pose_change;
+  std::optional<CameraCorrection> camera_correction;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::array<TileEntry, kNumTileKinds> tiles;  // in the order of TileKind
 };

@@ -59,16 +59,6 @@ bool IsValid(std::span<const BundleView> views, std::span<const Segment3> lines,
          std::all_of(sightings.begin(), sightings.end(), is_sighting);
 }
 
-AnchoredSegment Anchor(const Segment3& line) {
-  const Eigen::Vector3d direction = line.Delta().normalized();
-  Eigen::Index least = 0;
-  direction.cwiseAbs().minCoeff(&least);
-  AnchoredSegment anchored{line, {}};
-  anchored.across.col(0) = direction.cross(Eigen::Vector3d::Unit(least)).normalized();
-  anchored.across.col(1) = direction.cross(anchored.across.col(0));
-  return anchored;
-}
-
 class BundleProblem {
  public:
   BundleProblem(std::span<const BundleView> views, std::span<const Segment3> lines,
@@ -87,7 +77,7 @@ class BundleProblem {
     }
     anchored_.resize(lines.size());
     for (size_t i = 0; i < lines.size(); ++i) {
-      if (lines[i].Length() > kMinLength) anchored_[i] = Anchor(lines[i]);
+      if (lines[i].Length() > kMinLength) anchored_[i] = AnchorOf(lines[i]);
     }
     deltas_.assign(lines.size(), {});
   }

@@ -58,9 +58,10 @@ Status SessionOptions::Validate() const {
 }
 
 struct Session::Impl {
-  Impl(const SessionOptions& session_options, std::unique_ptr<LineDetector> line_detector,
-       std::unique_ptr<PoseRefiner> pose_refiner)
-      : options(session_options),
+  Impl(const LineMap& line_map, const SessionOptions& session_options,
+       std::unique_ptr<LineDetector> line_detector, std::unique_ptr<PoseRefiner> pose_refiner)
+      : map(line_map),
+        options(session_options),
         detector(std::move(line_detector)),
         refiner(std::move(pose_refiner)),
         tracker(refiner.get(), options.stream),
@@ -86,6 +87,7 @@ struct Session::Impl {
   void BeginResult(const FrameTicket& ticket);
   void Publish(FrameOutcome outcome, const FrameTicket& ticket);
 
+  const LineMap& map;
   const SessionOptions options;
   const std::unique_ptr<LineDetector> detector;
   const std::unique_ptr<PoseRefiner> refiner;
@@ -95,8 +97,9 @@ struct Session::Impl {
   ResultQueue results;
   std::atomic<bool> is_device_lost{false};
 
-  std::mutex submit_mutex;  // guards the three below and the order of submissions
-  Rectifier rectifier;      // of the last camera: most streams have one
+  std::mutex submit_mutex;  // guards the four below and the order of submissions
+  ImageCamera camera;       // the last one: most streams have one
+  Rectifier rectifier;      // of that, as the map corrects it
   std::optional<int64_t> last_timestamp_ns;
   uint64_t num_submitted = 0;
 
@@ -124,11 +127,12 @@ Result<SubmitOutcome> Session::Impl::Submit(const SessionFrame& frame) {
                  "SessionFrame: timestamp_ns " + std::to_string(frame.timestamp_ns) +
                      " is not after the last frame's " + std::to_string(*last_timestamp_ns)};
   }
-  if (!(rectifier.image_camera() == frame.camera)) {
-    const Result<Rectifier> created = Rectifier::Create(frame.camera);
+  if (!(camera == frame.camera)) {
+    const Result<Rectifier> created = Rectifier::Create(map.Corrected(frame.camera));
     if (!created) {
       return Error{ErrorCode::kInvalidArgument, "SessionFrame: camera: " + created.error().message};
     }
+    camera = frame.camera;
     rectifier = *created;
   }
   FrameSlot* slot = queue.BeginPush(options.submit_timeout_ns);
@@ -312,7 +316,8 @@ Result<std::unique_ptr<Session>> Session::Create(const MapIndex& index,
   if (const Status valid = options.Validate(); !valid) return valid.error();
   Result<std::unique_ptr<PoseRefiner>> refiner = PoseRefiner::Create(index, options.refiner);
   if (!refiner) return refiner.error();
-  auto impl = std::make_unique<Impl>(options, std::move(detector), *std::move(refiner));
+  auto impl =
+      std::make_unique<Impl>(index.map(), options, std::move(detector), *std::move(refiner));
   try {
     impl->worker = std::thread([raw = impl.get()] { raw->Run(); });
   } catch (const std::system_error& e) {

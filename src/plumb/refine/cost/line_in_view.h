@@ -25,6 +25,17 @@ struct AnchoredSegment {
   }
 };
 
+/// @param line  Of positive length.
+inline AnchoredSegment AnchorOf(const Segment3& line) {
+  const Eigen::Vector3d direction = line.Delta().normalized();
+  Eigen::Index least = 0;
+  direction.cwiseAbs().minCoeff(&least);
+  AnchoredSegment anchored{line, {}};
+  anchored.across.col(0) = direction.cross(Eigen::Vector3d::Unit(least)).normalized();
+  anchored.across.col(1) = direction.cross(anchored.across.col(0));
+  return anchored;
+}
+
 /// Perpendicular distances of a segment's ends to the projected infinite line:
 ///
 ///   r = [ d(l, p_start), d(l, p_end) ] / sigma      2 residuals, unitless

@@ -99,6 +99,23 @@ TEST(LiftFusion, ThePixelsAndTheRaysStay) {
   }
 }
 
+TEST(LiftFusion, SegmentsWithoutAPartAreTakenFromTheViews) {
+  const std::vector<LiftedPart> parts = {Part(0, 0.0, 1.0, 2.0, 2.0)};
+  TriangulatedSegment alone = ByViews(1, 3.0, 3.5, 0.05);
+  alone.segment_in_world = {{1.0, 2.0, 3.0}, {1.5, 2.0, 3.0}};
+  const std::vector<TriangulatedSegment> views = {ByViews(0, 2.0, 2.0, 0.01), alone};
+  DepthFit fit;
+  fit.correction.scale = {0.0, 0.0, -0.5};  // of the sensor, not of the views
+  size_t averaged = 0;
+  const auto segments = FuseLifts({kPose, kSegments, parts, views}, fit, {}, &averaged);
+  ASSERT_EQ(segments.size(), 2u);
+  EXPECT_EQ(averaged, 0u);
+  EXPECT_EQ(segments[1].segment_px.start, kSegments[1].start);
+  EXPECT_EQ(segments[1].segment_px.score, kSegments[1].score);
+  EXPECT_EQ(segments[1].segment_in_world.start, alone.segment_in_world.start);
+  EXPECT_EQ(segments[1].segment_in_world.end, alone.segment_in_world.end);
+}
+
 TEST(LiftFusion, WhereViewsContradictTheCorrectedSensorCounts) {
   const std::vector<LiftedPart> parts = {Part(0, 0.0, 1.0, 2.0, 2.0), Part(1, 0.0, 1.0, 3.0, 3.0)};
   // One end agrees, the other does not.

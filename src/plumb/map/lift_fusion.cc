@@ -92,6 +92,12 @@ std::vector<LiftedSegment> FuseLifts(const FrameLifts& frame, const DepthFit& fi
     };
     fused.push_back({part.segment_px, {in_world(0), in_world(1)}, std::nullopt});
   });
+  auto by_sensor = frame.by_sensor.begin();
+  for (const TriangulatedSegment& segment : frame.by_views) {
+    while (by_sensor != frame.by_sensor.end() && by_sensor->source < segment.source) ++by_sensor;
+    if (by_sensor != frame.by_sensor.end() && by_sensor->source == segment.source) continue;
+    fused.push_back({frame.segments[segment.source], segment.segment_in_world, std::nullopt});
+  }
   return fused;
 }
 

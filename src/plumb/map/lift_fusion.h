@@ -26,7 +26,8 @@ struct FrameLifts {
 std::vector<DepthSample> CompareDepths(std::span<const FrameLifts> frames);
 
 /// The frame's segments in the world: parts with corrected depth, averaged by variance with the
-/// depth by views where both agree within three standard deviations.
+/// depth by views where both agree within three standard deviations; then the segments that have no
+/// part, as the views have lifted them.
 /// @param out_num_averaged  Added to; may be null.
 std::vector<LiftedSegment> FuseLifts(const FrameLifts& frame, const DepthFit& fit,
                                      const DepthNoise& noise = {},

@@ -27,6 +27,9 @@ constexpr double kConvergedPx = 0.01, kConvergedStep = 1e-6;
 constexpr size_t kMinPairs = 4;
 constexpr double kMaxRotationStep = 0.1;
 constexpr double kMinResidualScale = 0.02;
+// Weight of lines beside points. A segment counts for every line that it meets, a long one up to
+// four times: together they promise more than they hold. docs/adr/0018.
+constexpr double kLineShare = 0.3;
 
 }  // namespace
 
@@ -118,7 +121,7 @@ FineAlignment FineAligner::Run(const Rigid3& start, std::span<const AlignmentSte
       equations.Add(line_terms.equations);
     } else {
       equations.Add(line_terms.equations,
-                    1.0 / std::max(line_terms.residual_scale, kMinResidualScale));
+                    kLineShare / std::max(line_terms.residual_scale, kMinResidualScale));
       const auto terms = point_terms_.Accumulate(camera_, out.cam_from_world, *points);
       equations.Add(terms.equations);
       out.point_information = terms.equations.information;
@@ -145,7 +148,7 @@ Rigid3 FineAligner::Polish(const FineAlignment& alignment, double robust, int ma
     equations.Add(
         line_terms_.Accumulate(camera_, Ends(), observations_, robust, LineLoss::kBothEnds)
             .equations,
-        1.0 / std::max(alignment.residual_scale, kMinResidualScale));
+        kLineShare / std::max(alignment.residual_scale, kMinResidualScale));
     equations.Add(point_terms_.Accumulate(camera_, pose, points, alignment.point_scale).equations);
     const auto delta = SolveStep(equations, kMaxRotationStep);
     if (!delta) break;

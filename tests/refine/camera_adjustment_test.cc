@@ -117,6 +117,18 @@ TEST(AdjustCamera, AFixedCameraCostsMoreThanTheRightOne) {
   EXPECT_LT(right->cost, static_cast<double>(scene.sightings.size()));
 }
 
+// A lens that images less must not look better for it.
+TEST(AdjustCamera, CountsWhatTheCameraCanHaveImaged) {
+  const Scene scene = MakeScene(kPinhole, 0.0);
+  CameraAdjustmentOptions fixed;
+  fixed.camera_is_fixed = true;
+  const auto all = Adjust(scene, kPinhole, fixed);
+  const auto barrel = Adjust(scene, Camera525(LensModel::kRadTan, -0.9, 0.0), fixed);
+  ASSERT_TRUE(all && barrel);
+  EXPECT_EQ(all->num_sightings, scene.sightings.size());
+  EXPECT_LT(barrel->num_sightings, scene.sightings.size());
+}
+
 TEST(AdjustCamera, OutliersDoNotMoveIt) {
   Scene scene = MakeScene(kPinhole, 0.35);
   std::mt19937 rng(3);

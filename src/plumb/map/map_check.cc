@@ -174,6 +174,13 @@ Status CheckMap(const LineMap& map) {
       return Error{ErrorCode::kInvalidArgument,
                    "The correction of the camera: " + rectifier.error().message};
     }
+    const Camera& given = map.camera_correction->given.pinhole;
+    const Camera& corrected = map.camera_correction->corrected.pinhole;
+    if (given.width_px != corrected.width_px || given.height_px != corrected.height_px ||
+        given.fx * corrected.fx < 0.0 || given.fy * corrected.fy < 0.0) {
+      return Error{ErrorCode::kInvalidArgument,
+                   "The correction of the camera changes its size or mirrors it"};
+    }
   }
   if (map.detector.size() > kMaxDetectorBytes || !IsUtf8(map.detector)) {
     return Error{ErrorCode::kInvalidArgument,

@@ -13,7 +13,7 @@ namespace plumb {
 /// - sightings: key frames of one line strictly ascending, unit directions, distances > 0
 /// - key frames: unit quaternions, valid cameras; scores in [0, 1]; LiftedSegment::line exists
 /// - covariance_factor > 0; covariance_growth and pose_change >= 0
-/// - both cameras of camera_correction are ones that can be rectified
+/// - both cameras of camera_correction can be rectified, have one size, and mirror alike
 /// - `detector` is at most 1024 bytes of UTF-8
 /// @return kInvalidArgument naming the first offender.
 Status CheckMap(const LineMap& map);

@@ -132,7 +132,8 @@ class CameraProblem {
     for (const CameraSighting& sighting : sightings) {
       Add(sighting, *undistortion, &loss, changes.data(), &problem);
     }
-    if (problem.NumResidualBlocks() == 0) return std::nullopt;
+    const int num_sightings = problem.NumResidualBlocks();
+    if (num_sightings == 0) return std::nullopt;
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     for (auto& delta : deltas_) {
       if (problem.HasParameterBlock(delta.data())) ordering->AddElementToGroup(delta.data(), 0);
@@ -152,10 +153,11 @@ class CameraProblem {
     if (!summary.IsSolutionUsable() || !changes.allFinite()) return std::nullopt;
     camera_ = Changed(camera_, changes);
     cost_ = summary.final_cost;
+    num_sightings_ = static_cast<size_t>(num_sightings);
     return changes.cwiseAbs().maxCoeff();
   }
 
-  AdjustedCamera Result() const { return {camera_, cost_}; }
+  AdjustedCamera Result() const { return {camera_, cost_, num_sightings_}; }
 
  private:
   // Takes no block that has no value at the start (a line through the camera's centre).
@@ -169,7 +171,8 @@ class CameraProblem {
     line->anchors_in_world = {pose * line->anchors_in_world.start,
                               pose * line->anchors_in_world.end};
     line->across = pose.RotationMatrix() * line->across;
-    // One unit for all rounds and for both ways of the hold-out test: the start's pixels.
+    // Pixels of the start's ideal image; those of the image as taken differ by what the lens
+    // stretches there.
     std::unique_ptr<ceres::CostFunction> cost(LineInCameraCost::Create(
         *line, {start_.pinhole.fx, start_.pinhole.fy}, *start, *end, options_.pixel_sigma_px));
     double* const delta = deltas_[sighting.line].data();
@@ -205,6 +208,7 @@ class CameraProblem {
   std::vector<std::optional<AnchoredSegment>> anchored_;
   std::vector<std::array<double, 4>> deltas_;
   double cost_ = 0.0;
+  size_t num_sightings_ = 0;
 };
 
 }  // namespace
@@ -223,8 +227,8 @@ std::optional<AdjustedCamera> AdjustCamera(const ImageCamera& start,
   CameraProblem problem(camera, cam_from_world, lines_in_world, options);
   for (int round = 0; round < options.max_rounds; ++round) {
     const std::optional<double> change = problem.Round(sightings);
-    if (!change) return std::nullopt;
-    if (*change < kConverged) break;
+    if (!change && round == 0) return std::nullopt;
+    if (!change || *change < kConverged) break;
   }
   return problem.Result();
 }

@@ -2,6 +2,7 @@
 // that they see.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -33,8 +34,10 @@ struct CameraAdjustmentOptions {
 
 struct AdjustedCamera {
   ImageCamera camera;
-  /// Negative logarithm of the sightings' likelihood [nat], but for a constant.
+  /// Negative logarithm of the sightings' likelihood [nat], but for a constant; of an adjusted
+  /// camera with its prior. Compare costs of as many sightings only.
   double cost = 0.0;
+  size_t num_sightings = 0;  // that the camera can have imaged
 };
 
 /// Minimises the perpendicular distances of the segments to their projected lines, robustly, over
@@ -44,7 +47,7 @@ struct AdjustedCamera {
 ///
 /// @param lines_in_world  Start values. One without length or sightings says nothing.
 /// @return nullopt for input out of range (an index, a sigma, a pose or a number that is not
-///         finite, a camera that is not one) and when no step could be made.
+///         finite, a camera that is not one) and when no first step could be made.
 /// Source: docs/adr/0017-views-correct-the-camera.md.
 std::optional<AdjustedCamera> AdjustCamera(const ImageCamera& start,
                                            std::span<const Rigid3> cam_from_world,

@@ -12,7 +12,7 @@ namespace plumb {
 namespace {
 
 constexpr uint32_t kMinObserving = 3;  // key frames, of a line that says something
-constexpr size_t kMaxLines = 800;      // the longest tracks
+constexpr size_t kMaxLines = 800;      // the first: those of the longest tracks
 constexpr size_t kMinSightings = 500;  // a half
 constexpr double kMinGain = 10.0;      // [nat]
 constexpr double kMinShiftPx = 0.1;
@@ -25,9 +25,10 @@ struct Sightings {
 Sightings Collect(const LineMap& map, const Rectifier& rectifier) {
   Sightings out;
   const auto num_key_frames = static_cast<uint32_t>(map.key_frames.size());
+  const size_t num_lines = std::min(map.lines.size(), kMaxLines);
   for (uint32_t k = 0; k < num_key_frames; ++k) {
     for (const LiftedSegment& segment : map.key_frames[k].segments) {
-      if (!segment.line || *segment.line >= kMaxLines ||
+      if (!segment.line || *segment.line >= num_lines ||
           map.lines[*segment.line].num_observing < kMinObserving) {
         continue;
       }
@@ -62,7 +63,9 @@ class HeldOut {
     fixed.camera_is_fixed = true;
     const auto before = AdjustCamera(given_, poses_, lines_, others, fixed);
     const auto after = AdjustCamera(camera->camera, poses_, lines_, others, fixed);
-    return before && after && after->cost < before->cost - kMinGain;
+    // What a camera cannot have imaged must not count in its favour.
+    return before && after && after->num_sightings == before->num_sightings &&
+           after->cost < before->cost - kMinGain;
   }
 
  private:
@@ -70,6 +73,36 @@ class HeldOut {
   std::vector<Rigid3> poses_;
   std::vector<Segment3> lines_;
 };
+
+// Calls visit(pixel, the same ray's pixel by the other camera or nullopt) over the image.
+template <typename Visit>
+void ForEachPixelPair(const CameraCorrection& correction, const Visit& visit) {
+  const auto from = LensMapping::Create(correction.given.lens);
+  const auto to = LensMapping::Create(correction.corrected.lens);
+  if (!from || !to) return;
+  const Camera &given = correction.given.pinhole, &corrected = correction.corrected.pinhole;
+  for (int i = 0; i <= kShiftSteps; ++i) {
+    for (int j = 0; j <= kShiftSteps; ++j) {
+      const Eigen::Vector2d px(i * (given.width_px - 1.0) / kShiftSteps,
+                               j * (given.height_px - 1.0) / kShiftSteps);
+      const auto ray = from->Undistort(given.Normalize(px));
+      if (!ray) continue;
+      const auto imaged = to->Distort(*ray);
+      visit(px, imaged ? std::optional<Eigen::Vector2d>(
+                             {corrected.fx * imaged->point.x() + corrected.cx,
+                              corrected.fy * imaged->point.y() + corrected.cy})
+                       : std::nullopt);
+    }
+  }
+}
+
+bool KeepsTheWholeImage(const CameraCorrection& correction) {
+  bool keeps = true;
+  ForEachPixelPair(correction, [&keeps](const Eigen::Vector2d&, const auto& imaged) {
+    keeps = keeps && imaged.has_value();
+  });
+  return keeps;
+}
 
 }  // namespace
 
@@ -87,28 +120,17 @@ std::optional<CameraCorrection> CalibrateCamera(const LineMap& map, const Rectif
   const std::optional<AdjustedCamera> fitted = held_out.Fit(sightings.all);
   if (!fitted || !Rectifier::Create(fitted->camera)) return std::nullopt;
   const CameraCorrection correction{given, fitted->camera};
-  if (LargestShiftPx(correction) < kMinShiftPx) return std::nullopt;
+  if (LargestShiftPx(correction) < kMinShiftPx || !KeepsTheWholeImage(correction)) {
+    return std::nullopt;
+  }
   return correction;
 }
 
 double LargestShiftPx(const CameraCorrection& correction) {
-  const auto from = LensMapping::Create(correction.given.lens);
-  const auto to = LensMapping::Create(correction.corrected.lens);
-  if (!from || !to) return 0.0;
-  const Camera &given = correction.given.pinhole, &corrected = correction.corrected.pinhole;
   double largest = 0.0;
-  for (int i = 0; i <= kShiftSteps; ++i) {
-    for (int j = 0; j <= kShiftSteps; ++j) {
-      const Eigen::Vector2d px(i * (given.width_px - 1.0) / kShiftSteps,
-                               j * (given.height_px - 1.0) / kShiftSteps);
-      const auto ray = from->Undistort(given.Normalize(px));
-      const auto imaged = ray ? to->Distort(*ray) : std::nullopt;
-      if (!imaged) continue;
-      const Eigen::Vector2d there(corrected.fx * imaged->point.x() + corrected.cx,
-                                  corrected.fy * imaged->point.y() + corrected.cy);
-      largest = std::max(largest, (there - px).norm());
-    }
-  }
+  ForEachPixelPair(correction, [&largest](const Eigen::Vector2d& px, const auto& imaged) {
+    if (imaged) largest = std::max(largest, (*imaged - px).norm());
+  });
   return largest;
 }
 

@@ -12,9 +12,9 @@ namespace plumb {
 /// over its views (AdjustCamera()), poses as they are. Wrong ones turn a pose by a share of the
 /// angle to the key frames that see the same lines.
 ///
-/// It is kept only if, fitted to one half of the key frames, it makes the lines of the other half
-/// agree better than chance would, both ways, and moves some part of the image by a tenth of a
-/// pixel.
+/// It is kept only if, fitted to the first or the second half of the key frames, it makes the lines
+/// of the other half agree better than chance would, both ways, moves some part of the image by a
+/// tenth of a pixel and loses none.
 /// @param map        Key frames of one camera; lines should come from depth images, not from views
 ///                   that already agree.
 /// @param rectifier  Of that camera: the key frames' segments are in its ideal image.

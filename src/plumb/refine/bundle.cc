@@ -7,7 +7,6 @@
 
 #include <ceres/loss_function.h>
 #include <ceres/manifold.h>
-#include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
@@ -15,6 +14,7 @@
 
 #include "plumb/refine/cost/line_in_view.h"
 #include "plumb/refine/cost/pose_prior.h"
+#include "plumb/refine/line_problem.h"
 #include "plumb/refine/quiet_ceres.h"
 
 namespace plumb {
@@ -22,20 +22,6 @@ namespace {
 
 constexpr double kMinLength = 1e-6;  // [m]
 constexpr size_t kMaxDensePoses = 500;
-
-bool IsPose(const Rigid3& pose) {
-  return pose.IsFinite() && std::abs(pose.rotation.norm() - 1.0) < 1e-3;
-}
-
-bool IsFinite(const Segment2& segment) {
-  return segment.start.allFinite() && segment.end.allFinite();
-}
-
-bool IsFinite(const Segment3& segment) {
-  return segment.start.allFinite() && segment.end.allFinite();
-}
-
-bool IsPositive(double value) { return std::isfinite(value) && value > 0.0; }
 
 // Ceres aborts the process on misuse, so that only checked input may get there.
 bool IsValid(std::span<const BundleView> views, std::span<const Segment3> lines,
@@ -96,26 +82,16 @@ class BundleProblem {
   }
 
   std::optional<Bundle> Solve() {
-    ceres::Solver::Options solver;
-    // Lines are eliminated; what is left has 7 columns a pose.
-    if (poses_.size() <= kMaxDensePoses) {
-      solver.linear_solver_type = ceres::DENSE_SCHUR;
-    } else {
+    ceres::Solver::Options solver = EliminateLines(problem_, deltas_, options_.max_iterations);
+    // Without the lines 7 columns a pose are left.
+    if (poses_.size() > kMaxDensePoses) {
       solver.linear_solver_type = ceres::ITERATIVE_SCHUR;
       solver.preconditioner_type = ceres::SCHUR_JACOBI;
     }
-    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    for (auto& delta : deltas_) {
-      if (problem_.HasParameterBlock(delta.data())) ordering->AddElementToGroup(delta.data(), 0);
-    }
     for (Rigid3& pose : poses_) {
-      ordering->AddElementToGroup(pose.rotation.coeffs().data(), 1);
-      ordering->AddElementToGroup(pose.translation.data(), 1);
+      solver.linear_solver_ordering->AddElementToGroup(pose.rotation.coeffs().data(), 1);
+      solver.linear_solver_ordering->AddElementToGroup(pose.translation.data(), 1);
     }
-    solver.linear_solver_ordering = ordering;
-    solver.max_num_iterations = options_.max_iterations;
-    solver.num_threads = 1;  // one order of summation
-    solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem_, &summary);
     if (!summary.IsSolutionUsable()) return std::nullopt;

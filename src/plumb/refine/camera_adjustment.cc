@@ -9,11 +9,11 @@
 
 #include <ceres/loss_function.h>
 #include <ceres/normal_prior.h>
-#include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
 #include "plumb/refine/cost/line_in_camera.h"
+#include "plumb/refine/line_problem.h"
 #include "plumb/refine/quiet_ceres.h"
 
 namespace plumb {
@@ -25,27 +25,13 @@ constexpr double kConverged = 1e-5;  // largest change of a round
 
 using Changes = Eigen::Matrix<double, kNumCameraChanges, 1>;
 
-bool IsPositive(double value) { return std::isfinite(value) && value > 0.0; }
-
-bool IsFinite(const Segment2& segment) {
-  return segment.start.allFinite() && segment.end.allFinite();
-}
-
-bool IsFinite(const Segment3& segment) {
-  return segment.start.allFinite() && segment.end.allFinite();
-}
-
 // Ceres aborts the process on misuse, so that only checked input may get there.
 bool IsValid(std::span<const Rigid3> poses, std::span<const Segment3> lines,
              std::span<const CameraSighting> sightings, const CameraAdjustmentOptions& options) {
   return IsPositive(options.pixel_sigma_px) && IsPositive(options.cauchy_scale) &&
          IsPositive(options.focal_sigma) && IsPositive(options.centre_sigma) &&
          IsPositive(options.distortion_sigma) && options.max_rounds >= 1 &&
-         options.max_iterations >= 1 &&
-         std::all_of(poses.begin(), poses.end(),
-                     [](const Rigid3& pose) {
-                       return pose.IsFinite() && std::abs(pose.rotation.norm() - 1.0) < 1e-3;
-                     }) &&
+         options.max_iterations >= 1 && std::all_of(poses.begin(), poses.end(), IsPose) &&
          std::all_of(lines.begin(), lines.end(),
                      [](const Segment3& line) { return IsFinite(line); }) &&
          std::all_of(sightings.begin(), sightings.end(), [&](const CameraSighting& sighting) {
@@ -134,20 +120,11 @@ class CameraProblem {
     }
     const int num_sightings = problem.NumResidualBlocks();
     if (num_sightings == 0) return std::nullopt;
-    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    for (auto& delta : deltas_) {
-      if (problem.HasParameterBlock(delta.data())) ordering->AddElementToGroup(delta.data(), 0);
-    }
-    ordering->AddElementToGroup(changes.data(), 1);
     if (options_.camera_is_fixed) problem.SetParameterBlockConstant(changes.data());
     AddPrior(changes.data(), &problem);
 
-    ceres::Solver::Options solver;
-    solver.linear_solver_type = ceres::DENSE_SCHUR;
-    solver.linear_solver_ordering = ordering;
-    solver.max_num_iterations = options_.max_iterations;
-    solver.num_threads = 1;  // one order of summation
-    solver.logging_type = ceres::SILENT;
+    ceres::Solver::Options solver = EliminateLines(problem, deltas_, options_.max_iterations);
+    solver.linear_solver_ordering->AddElementToGroup(changes.data(), 1);
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem, &summary);
     if (!summary.IsSolutionUsable() || !changes.allFinite()) return std::nullopt;

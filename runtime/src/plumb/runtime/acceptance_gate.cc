@@ -11,7 +11,6 @@ namespace {
 
 constexpr uint32_t kMinTried = 20;
 constexpr double kDistinctPositionM = 0.02, kDistinctRotationRad = 0.01;
-constexpr double kMaxRunnerUpRatio = 0.97;
 constexpr double kMaxDeviations = 3.0;
 constexpr double kTightPositionM = 0.10, kTightRotationRad = 0.035;
 constexpr double kMinGain = 4.0;
@@ -52,10 +51,6 @@ int CountObservedDirections(const Matrix6d& information, const PosePrior& prior)
   return Observe(information / kMinGain, prior_information).num_observed;
 }
 
-bool IsAmbiguous(double runner_up_ratio, double evidence_nats) {
-  return runner_up_ratio > (evidence_nats < kWeakNats ? kWeakRunnerUpRatio : kMaxRunnerUpRatio);
-}
-
 RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options) {
   // Written so that NaN never refines.
   if (!(evidence.evidence_nats >= options.min_evidence_nats) ||
@@ -68,7 +63,7 @@ RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options) {
   if (!(evidence.refined.Value() >= options.min_gain * evidence.prior.Value())) {
     return RefineStatus::kKeptPrior;
   }
-  if (IsAmbiguous(evidence.runner_up_ratio, evidence.evidence_nats) || !evidence.is_near_prior) {
+  if (!(evidence.runner_up_ratio <= options.max_runner_up_ratio) || !evidence.is_near_prior) {
     return RefineStatus::kAmbiguous;
   }
   return RefineStatus::kRefined;

@@ -14,10 +14,13 @@ struct GateEvidence {
   PoseSupport refined, prior;
   double runner_up_ratio = 0.0;     // value of the best clearly different pose over the refined's
   bool is_near_prior = true;        // IsPlausible()
-  double evidence_nats = 0.0;       // MatchEvidence of the refined pose
+  double evidence_nats = 0.0;       // of the refined pose, MatchEvidence
   int num_observed_directions = 0;  // of 6
 };
 
+/// A clearly different pose with more than this share of a pose's support leaves open which of both
+/// it is.
+inline constexpr double kMaxRunnerUpRatio = 0.97;
 /// Below so much evidence a pose is weak: a rival needs only this share of its support to make it
 /// ambiguous, and it is worth looking for one farther off than the prior says. Weak poses
 /// that were right had rivals of 0.77 at most, a staircase one step off has one of 0.86 and more
@@ -28,6 +31,7 @@ struct GateOptions {
   double min_map_support = 0.05;
   /// EvidenceToBeat() of the poses that were tried.
   double min_evidence_nats = 3.0;
+  double max_runner_up_ratio = kMaxRunnerUpRatio;
   double min_gain = 1.03;  // of the support's value over the prior's; 1.00 in a stream
   /// The lines must determine all six directions better than the prior does. Not in a stream, whose
   /// prediction is good to 2 cm: there the prior may hold what the lines leave open.
@@ -57,10 +61,6 @@ bool IsPlausible(const Rigid3& cam_from_world, const PosePrior& prior);
 /// not make good lines look bad.
 /// @param information  Scaled to the residuals' real size.
 int CountObservedDirections(const Matrix6d& information, const PosePrior& prior);
-
-/// Whether a clearly different pose that has this share of a pose's support leaves open which of
-/// both it is: 0.97, and kWeakRunnerUpRatio when the pose is weak.
-bool IsAmbiguous(double runner_up_ratio, double evidence_nats);
 
 /// @return kRefined unless a rule of docs/method/association.md ("Status") speaks against it.
 RefineStatus Decide(const GateEvidence& evidence, const GateOptions& options);

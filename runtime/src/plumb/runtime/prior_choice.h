@@ -33,8 +33,9 @@ struct PriorChoice {
 
 /// The refined pose with the most evidence; one that only points decide when there is none that
 /// lines do. It is kAmbiguous when a clearly different pose of another prior has about as much
-/// evidence (IsAmbiguous), whatever became of that one, or is held by points. Where nothing was
-/// refined, the prior with the most evidence says why. Ties go to the first prior.
+/// evidence (kMaxRunnerUpRatio, kWeakRunnerUpRatio), whatever became of that one, or is held by
+/// points. Where nothing was refined, the prior with the most evidence says why. Ties go to the
+/// first prior.
 /// @param outcomes  One a prior, at least one.
 PriorChoice ChoosePrior(std::span<const PriorOutcome> outcomes);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "plumb/base/stopwatch.h"
 #include "plumb/refine/uncertainty.h"
@@ -101,22 +102,23 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   BeginTrials(input);
   WidenTrials();
   const PriorChoice choice = Choose(input.camera);
-  const Trial& trial = trials_[choice.prior];
+  Trial& trial = trials_[choice.prior];
   const Attempt& attempt = trial.attempt;
   result->status = choice.status;
   result->runner_up_ratio = choice.runner_up_ratio;
+  if (input.search && choice.status == RefineStatus::kRefined &&
+      attempt.status == RefineStatus::kRefined && attempt.best.IsWeak() &&
+      !HoldsByPoints(trial.input, trial.points) && !IsOutOfTime(kWideningShare)) {
+    LookFarther(&trial);
+    result->status = attempt.status;
+    result->runner_up_ratio = std::max(result->runner_up_ratio, attempt.evidence.runner_up_ratio);
+  }
   result->map_support = attempt.evidence.refined.map_share;
   result->evidence_nats = attempt.evidence.evidence_nats;
   result->num_observed_directions = attempt.evidence.num_observed_directions;
-  const bool holds_by_points = HoldsByPoints(trial.input, trial.points);
-  if (input.search && result->status == RefineStatus::kRefined &&
-      attempt.evidence.evidence_nats < kWeakNats && !holds_by_points &&
-      !IsOutOfTime(kWideningShare) && HasRival(trial)) {
-    result->status = RefineStatus::kAmbiguous;
-  }
   if (result->status == RefineStatus::kRefined) {
     result->prior_index = static_cast<uint32_t>(choice.prior);
-    FineAlignment start = attempt.alignment;
+    FineAlignment start = attempt.best.alignment;
     if (attempt.status != RefineStatus::kRefined) {
       // The lines do not decide, the points do.
       start = FineAlignment{};
@@ -150,7 +152,7 @@ void SearchMethod::BeginTrials(const RefineInput& input) {
     stages_.points_ns += watch.Lap();
     try_deadline_ =
         num_priors == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_priors - k));
-    trial.attempt = Try(trial, trial.prior, options_.num_hypotheses, num_tried);
+    trial.attempt = Try(trial, trial.prior, options_.num_hypotheses, num_tried, !input.search);
   }
 }
 
@@ -199,7 +201,7 @@ void SearchMethod::WidenTrials() {
     const PosePrior wide = widened(trial);
     try_deadline_ = num_left == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_left));
     --num_left;
-    const Attempt second = Try(trial, wide, num_hypotheses, num_tried);
+    const Attempt second = Try(trial, wide, num_hypotheses, num_tried, true);
     if (second.status != RefineStatus::kRefined) continue;
     trial.attempt = second;
     trial.prior = wide;
@@ -210,15 +212,17 @@ PriorChoice SearchMethod::Choose(const Camera& camera) {
   Stopwatch watch;
   outcomes_.clear();
   for (const Trial& trial : trials_) {
+    const Survivor& best = trial.attempt.best;
     PriorOutcome& outcome = outcomes_.emplace_back();
     outcome.status = trial.attempt.status;
     outcome.runner_up_ratio = trial.attempt.evidence.runner_up_ratio;
     outcome.evidence_nats = trial.attempt.evidence.evidence_nats;
     if (trial.attempt.has_pose) {
-      outcome.cam_from_world = trial.attempt.alignment.cam_from_world;
+      outcome.cam_from_world = best.alignment.cam_from_world;
       if (trials_.size() > 1) {
         selector_.SelectForSearch(camera, *outcome.cam_from_world, 0.0, &search_lines_);
-        outcome.evidence_nats = MeasureEvidence(camera, *outcome.cam_from_world).nats;
+        const double nats = FusedEvidence(camera, *outcome.cam_from_world);
+        outcome.evidence_nats = best.is_by_key_frames ? std::max(nats, best.nats) : nats;
       }
     }
     if (outcome.status != RefineStatus::kRefined && HoldsByPoints(trial.input, trial.points)) {
@@ -239,7 +243,9 @@ void SearchMethod::Finish(const RefineInput& input, const PosePrior& prior, Fine
   if (options_.residual == LineResidual::kMidpointAngle) {
     FinishOneToOne(input, &alignment);
   } else {
-    if (!IsOutOfTime(kLastStepsShare)) FinishOnLocalLines(input, WeakFactor(prior), &alignment);
+    if (!IsOutOfTime(kLastStepsShare)) {
+      AlignOnLocalLines(input.camera, WeakFactor(prior), &alignment);
+    }
     stages_.local_ns = watch.Lap();
     if (!IsOutOfTime()) FinishWithPoints(input, WeakFactor(prior), &alignment);
   }
@@ -277,19 +283,24 @@ bool SearchMethod::HoldsByPoints(const RefineInput& input, const PointPose& poin
          IsPlausible(points.cam_from_world, input.prior);
 }
 
-bool SearchMethod::HasRival(const Trial& trial) {
-  PosePrior wide = trial.prior;
+void SearchMethod::LookFarther(Trial* trial) {
+  PosePrior wide = trial->prior;
   wide.position_sigma_m *= kRivalFactor;
   wide.rotation_sigma_rad *= kRivalFactor;
   try_deadline_ = deadline_;
-  Try(trial, wide, kMaxHypotheses, kMaxHypotheses);
-  const Rigid3& pose = trial.attempt.alignment.cam_from_world;
+  const Attempt second = Try(*trial, wide, kMaxHypotheses, kMaxHypotheses, false);
+  Attempt& attempt = trial->attempt;
+  if (second.status == RefineStatus::kRefined && second.best.nats > attempt.best.nats) {
+    attempt = second;
+    return;
+  }
+  if (attempt.best.is_by_key_frames) AskKeyFrames(trial->input, wide);
   // On the lines that the wide prior sees, as the supports of the survivors.
-  const double needed = kWeakRunnerUpRatio * MeasureSupport(trial.input.camera, pose).Value();
-  return std::any_of(survivors_.begin(), survivors_.end(), [&](const Survivor& survivor) {
-    return survivor.support.Value() > needed &&
-           IsClearlyDifferent(survivor.alignment.cam_from_world, pose);
-  });
+  attempt.best.support = MeasureSupport(trial->input.camera, attempt.best.alignment.cam_from_world);
+  attempt.evidence.runner_up_ratio = RunnerUpRatio(attempt.best);
+  if (attempt.evidence.runner_up_ratio > attempt.best.MaxRunnerUpRatio()) {
+    attempt.status = RefineStatus::kAmbiguous;
+  }
 }
 
 bool SearchMethod::MayWiden(const Attempt& attempt) const {
@@ -298,7 +309,7 @@ bool SearchMethod::MayWiden(const Attempt& attempt) const {
     case RefineStatus::kAmbiguous:
       return true;
     case RefineStatus::kKeptPrior:  // A prior that the search came back to is trusted.
-      return IsClearlyDifferent(attempt.alignment.cam_from_world, kept_);
+      return IsClearlyDifferent(attempt.best.alignment.cam_from_world, kept_);
     case RefineStatus::kRefined:
     case RefineStatus::kDegenerate:
       return false;
@@ -307,10 +318,10 @@ bool SearchMethod::MayWiden(const Attempt& attempt) const {
 }
 
 SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const PosePrior& prior,
-                                        uint32_t num_hypotheses, uint32_t num_tried) {
+                                        uint32_t num_hypotheses, uint32_t num_tried, bool is_last) {
   const RefineInput& input = trial.input;
   Attempt attempt;
-  attempt.alignment.cam_from_world = prior.cam_from_world;
+  attempt.best.alignment.cam_from_world = prior.cam_from_world;
   survivors_.clear();
   Stopwatch watch;
   selector_.SelectForSearch(input.camera, prior.cam_from_world, prior.rotation_sigma_rad,
@@ -347,36 +358,43 @@ SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const PosePrior& pri
     align_from(start.cam_from_world);
   }
   if (trial.points.num_inliers >= kMinSolvingPoints) align_from(trial.points.cam_from_world);
+  if (trial.attempt.has_pose) align_from(trial.attempt.best.alignment.cam_from_world);
   if (survivors_.empty()) return attempt;
   attempt.has_pose = true;
-  const Survivor& best = *std::max_element(
+  watch.Lap();
+  Survivor& best = *std::max_element(
       survivors_.begin(), survivors_.end(),
       [](const Survivor& a, const Survivor& b) { return a.support.Value() < b.support.Value(); });
-  double runner_up = 0.0;
-  for (const Survivor& survivor : survivors_) {
-    if (IsClearlyDifferent(survivor.alignment.cam_from_world, best.alignment.cam_from_world)) {
-      runner_up = std::max(runner_up, survivor.support.Value());
-    }
+  best.fused_nats = best.nats = FusedEvidence(input.camera, best.alignment.cam_from_world);
+  Judge(input, prior, num_tried, best, &attempt);
+  const bool is_open = attempt.status == RefineStatus::kLowSupport ||
+                       (attempt.status == RefineStatus::kAmbiguous && best.IsWeak());
+  if (is_last && is_open && !IsOutOfTime(kLastStepsShare)) {
+    const Survivor& other = AskKeyFrames(input, prior);
+    if (other.is_by_key_frames) Judge(input, prior, num_tried, other, &attempt);
   }
-  const double value = best.support.Value();
-  attempt.alignment = best.alignment;
-  watch.Lap();
-  attempt.evidence = {
-      .refined = best.support,
-      .prior = MeasureSupport(input.camera, kept_),
-      .runner_up_ratio = value > 0.0 ? runner_up / value : 0.0,
-      .is_near_prior = IsPlausible(best.alignment.cam_from_world, input.prior),
-      .evidence_nats = MeasureEvidence(input.camera, best.alignment.cam_from_world).nats,
-      .num_observed_directions = CountObservedDirections(
-          best.alignment.line_information / std::max(best.alignment.residual_scale, 1.0), prior)};
-  const double needed_nats =
-      EvidenceNeeded(best.alignment.cam_from_world, attempt.evidence.evidence_nats, num_tried);
-  attempt.status = Decide(attempt.evidence, {.min_map_support = options_.min_map_support,
-                                             .min_evidence_nats = needed_nats,
-                                             .min_gain = input.search ? kSearchGain : kStreamGain,
-                                             .needs_all_directions = input.search});
   stages_.support_ns += watch.Lap();
   return attempt;
+}
+
+void SearchMethod::Judge(const RefineInput& input, const PosePrior& prior, uint32_t num_tried,
+                         const Survivor& best, Attempt* attempt) {
+  attempt->best = best;
+  const FineAlignment& found = best.alignment;
+  attempt->evidence = {.refined = best.support,
+                       .prior = MeasureSupport(input.camera, kept_),
+                       .runner_up_ratio = RunnerUpRatio(best),
+                       .is_near_prior = IsPlausible(found.cam_from_world, input.prior),
+                       .evidence_nats = best.nats,
+                       .num_observed_directions = CountObservedDirections(
+                           found.line_information / std::max(found.residual_scale, 1.0), prior)};
+  attempt->status =
+      Decide(attempt->evidence,
+             {.min_map_support = options_.min_map_support,
+              .min_evidence_nats = EvidenceNeeded(found.cam_from_world, best.nats, num_tried),
+              .max_runner_up_ratio = best.MaxRunnerUpRatio(),
+              .min_gain = input.search ? kSearchGain : kStreamGain,
+              .needs_all_directions = input.search});
 }
 
 std::span<const FoundPose> SearchMethod::FindStarts(const Trial& trial, const PosePrior& prior,
@@ -432,9 +450,43 @@ PoseSupport SearchMethod::MeasureSupport(const Camera& camera, const Rigid3& cam
   return support_meter_.Measure(projected_, segments_.table);
 }
 
-MatchEvidence SearchMethod::MeasureEvidence(const Camera& camera, const Rigid3& cam_from_world) {
+double SearchMethod::FusedEvidence(const Camera& camera, const Rigid3& cam_from_world) {
   ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
-  return evidence_meter_.Measure(projected_, segments_.table);
+  return evidence_meter_.Measure(projected_, segments_.table).nats;
+}
+
+const SearchMethod::Survivor& SearchMethod::AskKeyFrames(const RefineInput& input,
+                                                         const PosePrior& prior) {
+  for (Survivor& survivor : survivors_) {
+    survivor.fused_nats = survivor.nats =
+        FusedEvidence(input.camera, survivor.alignment.cam_from_world);
+    FineAlignment local = survivor.alignment;
+    if (!AlignOnLocalLines(input.camera, WeakFactor(prior), &local)) continue;
+    ProjectCandidates(input.camera, local.cam_from_world, local_lines_, kMinVisiblePx, &projected_);
+    // The better of two measurements reaches by chance twice as often what one of them reaches.
+    const double nats =
+        evidence_meter_.Measure(projected_, segments_.table).nats - std::numbers::ln2;
+    if (!(nats > survivor.nats)) continue;
+    survivor.nats = nats;
+    survivor.alignment = local;
+    survivor.is_by_key_frames = true;
+  }
+  return *std::max_element(survivors_.begin(), survivors_.end(),
+                           [](const Survivor& a, const Survivor& b) { return a.nats < b.nats; });
+}
+
+double SearchMethod::RunnerUpRatio(const Survivor& best) const {
+  const auto value = [&best](const Survivor& survivor) {
+    return best.is_by_key_frames ? survivor.nats : survivor.support.Value();
+  };
+  if (!(value(best) > 0.0)) return 0.0;
+  double runner_up = 0.0;
+  for (const Survivor& other : survivors_) {
+    if (IsClearlyDifferent(other.alignment.cam_from_world, best.alignment.cam_from_world)) {
+      runner_up = std::max(runner_up, value(other));
+    }
+  }
+  return runner_up / value(best);
 }
 
 double SearchMethod::EvidenceNeeded(const Rigid3& cam_from_world, double nats, uint32_t num_tried) {
@@ -443,15 +495,13 @@ double SearchMethod::EvidenceNeeded(const Rigid3& cam_from_world, double nats, u
   return std::max(by_chance, kShareOfKeyFrames * expected_evidence_.LeastNear(cam_from_world));
 }
 
-void SearchMethod::FinishOnLocalLines(const RefineInput& input, const PosePriorFactor& prior,
-                                      FineAlignment* alignment) {
-  selector_.SelectLocal(input.camera, alignment->cam_from_world, &local_lines_);
-  if (local_lines_.size() < kMinLocalLines) {
-    SelectFineLines(input.camera, alignment->cam_from_world);
-    return;
-  }
-  aligner_.Begin(input.camera, alignment->cam_from_world, local_lines_, segments_);
+bool SearchMethod::AlignOnLocalLines(const Camera& camera, const PosePriorFactor& prior,
+                                     FineAlignment* alignment) {
+  selector_.SelectLocal(camera, alignment->cam_from_world, &local_lines_);
+  if (local_lines_.size() < kMinLocalLines) return false;
+  aligner_.Begin(camera, alignment->cam_from_world, local_lines_, segments_);
   *alignment = aligner_.Run(alignment->cam_from_world, LocalSchedule(), prior);
+  return true;
 }
 
 void SearchMethod::FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,

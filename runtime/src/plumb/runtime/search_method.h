@@ -38,12 +38,24 @@ class SearchMethod {
  private:
   static constexpr size_t kMaxSurvivors = 4;
 
+  /// A pose that the search has led to.
+  struct Survivor {
+    FineAlignment alignment;  // on the lines that have the most evidence for it
+    PoseSupport support;      // on the search lines
+    // MatchEvidence, where it was measured: of the fused lines, and of them or the key frames' own
+    // lines, whichever is more.
+    double fused_nats = 0.0, nats = 0.0;
+    bool is_by_key_frames = false;  // the latter
+
+    bool IsWeak() const { return fused_nats < kWeakNats; }
+    double MaxRunnerUpRatio() const { return IsWeak() ? kWeakRunnerUpRatio : kMaxRunnerUpRatio; }
+  };
   /// One try to find the pose within an uncertainty.
   struct Attempt {
     RefineStatus status = RefineStatus::kLowSupport;
     bool has_pose = false;  // something was found, whatever it is worth
     GateEvidence evidence;
-    FineAlignment alignment;  // of the best pose, on the fused lines
+    Survivor best;
   };
   /// What was tried around one of the frame's priors.
   struct Trial {
@@ -51,10 +63,6 @@ class SearchMethod {
     PosePrior prior;    // as the last attempt searched it: the input's, or wider
     PointPose points;   // without inliers: none
     Attempt attempt;
-  };
-  struct Survivor {
-    FineAlignment alignment;
-    PoseSupport support;
   };
 
   /// Searches around every prior.
@@ -66,13 +74,19 @@ class SearchMethod {
   bool ShouldWiden(const Trial& trial) const;
   PriorChoice Choose(const Camera& camera);
   /// @param num_tried  Poses that the frame has tried in the end, for EvidenceToBeat().
+  /// @param is_last    No other attempt follows: the key frames' own lines are asked for what the
+  ///                   fused ones leave open.
   Attempt Try(const Trial& trial, const PosePrior& prior, uint32_t num_hypotheses,
-              uint32_t num_tried);
+              uint32_t num_tried, bool is_last);
+  /// Decides on a survivor. @param attempt  Its verdict is replaced.
+  void Judge(const RefineInput& input, const PosePrior& prior, uint32_t num_tried,
+             const Survivor& best, Attempt* attempt);
   /// Whether a search with a larger uncertainty can still help.
   bool MayWiden(const Attempt& attempt) const;
-  /// Whether a pose far from an attempt's, farther than the prior says, explains the lines nearly
-  /// as well.
-  bool HasRival(const Trial& trial);
+  /// Searches farther off than the prior says, for a pose that has been accepted on little
+  /// evidence: takes one with more, and makes the trial ambiguous when another place has nearly as
+  /// much.
+  void LookFarther(Trial* trial);
   void AcceptPoints(const RefineInput& input);
   /// Solves the pose from the points alone, if there are enough.
   PointPose SolvePoints(const RefineInput& input);
@@ -85,14 +99,21 @@ class SearchMethod {
   bool IsOutOfTime(double share = 1.0) { return IsOutOfTime(deadline_, share); }
   bool IsOutOfTime(const Deadline& deadline, double share);
   PoseSupport MeasureSupport(const Camera& camera, const Rigid3& cam_from_world);
-  MatchEvidence MeasureEvidence(const Camera& camera, const Rigid3& cam_from_world);
+  double FusedEvidence(const Camera& camera, const Rigid3& cam_from_world);
+  /// Aligns all survivors on the key frames' own lines as well and takes the pose that these lead
+  /// to where they have more evidence than the fused lines. @return the one with the most evidence.
+  const Survivor& AskKeyFrames(const RefineInput& input, const PosePrior& prior);
+  /// Support of the best clearly different survivor over that of `best`; evidence over evidence
+  /// where `best` is by key frames.
+  double RunnerUpRatio(const Survivor& best) const;
   /// What a pose needs to be accepted, from chance and from the map's own key frames.
   double EvidenceNeeded(const Rigid3& cam_from_world, double nats, uint32_t num_tried);
   /// The last steps of a pose that was accepted, and its covariance.
   void Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
               RefineResult* result);
-  void FinishOnLocalLines(const RefineInput& input, const PosePriorFactor& prior,
-                          FineAlignment* alignment);
+  /// On the unfused lines of the nearest key frames. @return false when there are too few.
+  bool AlignOnLocalLines(const Camera& camera, const PosePriorFactor& prior,
+                         FineAlignment* alignment);
   void FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
                         FineAlignment* alignment);
   /// Instead of both: the paper's cost on one-to-one matches, from where the alignment ends.

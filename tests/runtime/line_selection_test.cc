@@ -104,6 +104,33 @@ TEST(FrameSegments, KeepTheLongestWithTheirNames) {
   EXPECT_TRUE(kept.segments.empty());
 }
 
+TEST(FineLines, AreSelectedAnewOnlyForAPoseFarAway) {
+  Room room;
+  FineLines fine(room.index);
+  std::vector<CandidateLine> expected;
+  const auto ids = [](const std::vector<CandidateLine>& lines) {
+    std::vector<uint32_t> out;
+    for (const CandidateLine& line : lines) out.push_back(line.id);
+    return out;
+  };
+  room.selector.SelectForAlignment(room.camera, kPose, &expected);
+  EXPECT_EQ(ids(fine.Near(room.camera, kPose)), ids(expected));
+  const auto turned = [](double radians) {
+    const Eigen::Quaterniond turn = ExpSo3({0.0, radians, 0.0});
+    return Rigid3{(turn * kPose.rotation).normalized(), turn * kPose.translation};
+  };
+  EXPECT_EQ(ids(fine.Near(room.camera, turned(0.03))), ids(expected));
+  const Rigid3 away = turned(0.5);
+  room.selector.SelectForAlignment(room.camera, away, &expected);
+  EXPECT_EQ(ids(fine.Near(room.camera, away)), ids(expected));
+  EXPECT_EQ(ids(fine.lines()), ids(expected));
+  // Near enough to keep, but of another frame.
+  const Rigid3 beside = turned(0.52);
+  room.selector.SelectForAlignment(room.camera, beside, &expected);
+  fine.Forget();
+  EXPECT_EQ(ids(fine.Near(room.camera, beside)), ids(expected));
+}
+
 TEST(FineAligner, ReachesThePoseFromWithinTheWidestGate) {
   Room room;
   std::vector<CandidateLine> lines;

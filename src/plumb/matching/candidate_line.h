@@ -40,6 +40,9 @@ struct ProjectedLines {
   void Resize(size_t count);
 };
 
+/// Projections shorter than this are not compared with segments [px].
+inline constexpr double kMinVisiblePx = 10.0;
+
 /// Projects the candidates, clipped to the near plane and the image, and keeps those of which more
 /// than `min_length_px` is visible, in their order. No allocation once `out` has the capacity.
 void ProjectCandidates(const Camera& camera, const Rigid3& cam_from_world,

@@ -8,7 +8,6 @@ namespace {
 
 constexpr uint32_t kNumKeyFrames = 3;
 constexpr size_t kMaxSegments = 250;
-constexpr double kMinVisiblePx = 10.0;
 constexpr double kRotationSigmaRad = 0.035;  // of the search from 2 deg
 
 }  // namespace

@@ -15,7 +15,6 @@ constexpr AlignmentStep kJoint[] = {{5.0, 0.09, 2.0}, {3.0, 0.06, 2.0}, {2.0, 0.
                                     {2.0, 0.05, 2.0}, {1.5, 0.04, 1.5}, {1.0, 0.04, 1.0},
                                     {1.0, 0.04, 1.0}, {1.0, 0.04, 1.0}, {1.0, 0.04, 1.0}};
 
-constexpr double kMinVisiblePx = 10.0;
 constexpr double kPixelSigma = 0.7;
 constexpr float kOverlapCapPx = 120.0f, kOverlapUnitPx = 30.0f;
 // How far the image may move before pairs are listed anew, and the depth at which a translation

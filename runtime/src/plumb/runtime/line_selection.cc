@@ -46,6 +46,8 @@ bool IsSeenAlike(const Eigen::Vector3d& midpoint, const Eigen::Vector3d& key_fra
          distance_b < kVisibility.max_distance_ratio * distance_a;
 }
 
+constexpr double kReusePositionM = 0.05, kReuseRotationRad = 0.035;
+
 }  // namespace
 
 double LineWeight(const MapLine& line) {
@@ -157,6 +159,19 @@ void LineSelector::SelectLocal(const Camera& camera, const Rigid3& cam_from_worl
          .covariance_end = LiftedCovariance(key_frame, axes[k], seen_from, segment.end),
          .id = entry.id});
   }
+}
+
+const std::vector<CandidateLine>& FineLines::Near(const Camera& camera,
+                                                  const Rigid3& cam_from_world) {
+  if (selected_at_) {
+    const PoseDistance distance = DistanceBetween(cam_from_world, *selected_at_);
+    if (distance.position_m < kReusePositionM && distance.rotation_rad < kReuseRotationRad) {
+      return lines_;
+    }
+  }
+  selector_.SelectForAlignment(camera, cam_from_world, &lines_);
+  selected_at_ = cam_from_world;
+  return lines_;
 }
 
 }  // namespace plumb

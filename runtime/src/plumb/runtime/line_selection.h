@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "plumb/geometry/camera.h"
@@ -50,6 +51,28 @@ class LineSelector {
   std::vector<VisibleLine> visible_;
   std::vector<uint32_t> key_frames_;
   std::vector<Ranked> ranked_;
+};
+
+/// The lines for the fine alignment, selected anew only for a pose far from the one before: up to 5
+/// cm and 2 deg the image moves by less than the selection's margin. Not thread-safe.
+class FineLines {
+ public:
+  /// `index` is borrowed.
+  explicit FineLines(const MapIndex& index) : selector_(index) {}
+
+  /// The next pose is of another frame.
+  void Forget() { selected_at_.reset(); }
+
+  /// LineSelector::SelectForAlignment at the pose, or at one near it. Valid until the next call.
+  const std::vector<CandidateLine>& Near(const Camera& camera, const Rigid3& cam_from_world);
+
+  /// Those of the last call.
+  const std::vector<CandidateLine>& lines() const { return lines_; }
+
+ private:
+  LineSelector selector_;
+  std::vector<CandidateLine> lines_;
+  std::optional<Rigid3> selected_at_;
 };
 
 }  // namespace plumb

@@ -15,7 +15,6 @@ namespace {
 
 constexpr uint32_t kNumKeyFrames = 5;
 constexpr double kMinOverlap = 0.25;
-constexpr double kMinVisiblePx = 10.0;
 constexpr double kMinGain = 1.03;
 constexpr double kVariancePx2 = 0.7 * 0.7;
 constexpr double kRobust = 2.0;

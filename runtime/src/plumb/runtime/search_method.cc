@@ -15,7 +15,6 @@ namespace {
 constexpr size_t kMaxSegments = 250;
 // Three lines determine a pose, a fourth one can contradict it.
 constexpr size_t kMinLines = 4, kMinSegments = 4;
-constexpr double kMinVisiblePx = 10.0;
 
 // The prior is a weak factor of the alignment: it decides only what the lines leave open.
 constexpr double kPriorFactorScale = 2.0;
@@ -31,11 +30,6 @@ constexpr uint32_t kMaxHypotheses = 2048;
 // How far rivals of a weak pose are looked for: repeated structure does not keep to the prior.
 constexpr double kRivalFactor = 3.0;
 
-constexpr size_t kMinLocalLines = 20;
-
-// Selected lines serve all poses that are so near: the image moves by less than its margin.
-constexpr double kReusePositionM = 0.05, kReuseRotationRad = 0.035;
-
 // Shares of the time budget after which no further start, attempt or last step begins.
 constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.9;
 
@@ -43,21 +37,12 @@ constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.
 // asked for when there is so much that no key frame asks for more.
 constexpr double kShareOfKeyFrames = 0.15, kPlentyOfNats = 60.0;
 
-// Points that take part in the joint solution lie this near to the lines' pose.
-constexpr size_t kMinPoints = 6;
 // A pose from points alone is a start for the lines, and with many points an answer.
 constexpr size_t kMinSolvingPoints = 12, kMinDecidingPoints = 40;
 // Beside points that decide, the search has only to contradict them: its best pose out of so many.
 constexpr size_t kAlignedBesidePoints = 12;
 
-// The joint solution's last word.
-constexpr double kLineRobust = 1.0;  // as in the steps before
-constexpr int kPolishSteps = 5;
-
 constexpr double kMinScale = 0.02;  // of residuals: perfect input must not divide by zero
-
-// Of the pairs that are reported as matches.
-constexpr AssociationGates kMatchGates{.sigma_px = 2.0, .sigma_sine = 0.05};
 
 bool IsSame(const Rigid3& a_from_world, const Rigid3& b_from_world) {
   const PoseDistance distance = DistanceBetween(a_from_world, b_from_world);
@@ -88,17 +73,24 @@ Matrix6d PriorInformation(const PosePrior& prior) { return CovarianceOf(prior).i
 }  // namespace
 
 SearchMethod::SearchMethod(const MapIndex& index, const PoseRefinerOptions& options)
-    : index_(index), options_(options), selector_(index), expected_evidence_(index) {}
+    : index_(index),
+      options_(options),
+      selector_(index),
+      fine_lines_(index),
+      last_steps_(index, &fine_lines_),
+      expected_evidence_(index) {}
 
 void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   Stopwatch whole, watch;
   stages_ = {};
   search_ns_ = 0;
   deadline_ = Deadline(options_.time_budget_ns);
-  fine_lines_pose_.reset();
+  fine_lines_.Forget();
   is_image_set_ = false;
   kept_ = input.prior.cam_from_world;
   segments_.Assign(input.segments, kMaxSegments);
+  AcceptPoints(input);
+  last_steps_.Begin({input.camera, &segments_, observed_points_, &all_points_});
   BeginTrials(input);
   WidenTrials();
   const PriorChoice choice = Choose(input.camera);
@@ -124,10 +116,10 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
       start = FineAlignment{};
       start.cam_from_world = trial.points.cam_from_world;
     }
-    Finish(trial.input, trial.prior, start, result);
+    Finish(trial.prior, start, result);
   }
   watch.Lap();
-  ReportMatches(input.camera, result->cam_from_world, result);
+  last_steps_.AppendMatches(result->cam_from_world, &result->matches);
   stages_.report_ns = watch.Lap();
   result->search_ns = search_ns_;
   result->match_and_refine_ns = whole.Lap() - search_ns_;
@@ -142,7 +134,6 @@ void SearchMethod::BeginTrials(const RefineInput& input) {
   for (const PosePrior& prior : input.more_priors) {
     num_tried += CountDistinctPoses(prior, num_hypotheses);
   }
-  AcceptPoints(input);
   for (size_t k = 0; k < num_priors; ++k) {
     if (k > 0 && IsOutOfTime(kStartsShare)) return;
     AddTrial(input, k);
@@ -236,18 +227,17 @@ PriorChoice SearchMethod::Choose(const Camera& camera) {
   return choice;
 }
 
-void SearchMethod::Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
-                          RefineResult* result) {
+void SearchMethod::Finish(const PosePrior& prior, FineAlignment alignment, RefineResult* result) {
   Stopwatch watch;
-  local_lines_.clear();
   if (options_.residual == LineResidual::kMidpointAngle) {
-    FinishOneToOne(input, &alignment);
+    last_steps_.SolveOneToOne(&alignment);
   } else {
+    last_steps_.ForgetLocalLines();
     if (!IsOutOfTime(kLastStepsShare)) {
-      AlignOnLocalLines(input.camera, WeakFactor(prior), &alignment);
+      last_steps_.AlignOnLocalLines(WeakFactor(prior), &alignment);
     }
     stages_.local_ns = watch.Lap();
-    if (!IsOutOfTime()) FinishWithPoints(input, WeakFactor(prior), &alignment);
+    if (!IsOutOfTime()) last_steps_.AlignWithPoints(WeakFactor(prior), &alignment);
   }
   stages_.joint_ns = watch.Lap();
   // Both families in units of the lines' own residuals, which the covariance divides out again.
@@ -335,10 +325,10 @@ SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const PosePrior& pri
   const auto schedule = input.search ? FineSchedule() : StreamSchedule();
   const auto align_from = [&](const Rigid3& start) {
     watch.Lap();
-    SelectFineLines(input.camera, start);
+    const std::vector<CandidateLine>& lines = fine_lines_.Near(input.camera, start);
     stages_.index_ns += watch.Lap();
-    if (fine_lines_.size() < kMinLines) return;
-    aligner_.Begin(input.camera, start, fine_lines_, segments_);
+    if (lines.size() < kMinLines) return;
+    aligner_.Begin(input.camera, start, lines, segments_);
     // Half way it shows whether a start leads to an answer that is already there.
     const size_t half = schedule.size() / 2;
     const Rigid3 half_way =
@@ -436,15 +426,6 @@ bool SearchMethod::IsOutOfTime(const Deadline& deadline, double share) {
   return true;
 }
 
-void SearchMethod::SelectFineLines(const Camera& camera, const Rigid3& cam_from_world) {
-  if (fine_lines_pose_) {
-    const PoseDistance distance = DistanceBetween(cam_from_world, *fine_lines_pose_);
-    if (distance.position_m < kReusePositionM && distance.rotation_rad < kReuseRotationRad) return;
-  }
-  selector_.SelectForAlignment(camera, cam_from_world, &fine_lines_);
-  fine_lines_pose_ = cam_from_world;
-}
-
 PoseSupport SearchMethod::MeasureSupport(const Camera& camera, const Rigid3& cam_from_world) {
   ProjectTable(camera, cam_from_world, search_table_, kMinVisiblePx, &projected_);
   return support_meter_.Measure(projected_, segments_.table);
@@ -461,8 +442,9 @@ const SearchMethod::Survivor& SearchMethod::AskKeyFrames(const RefineInput& inpu
     survivor.fused_nats = survivor.nats =
         FusedEvidence(input.camera, survivor.alignment.cam_from_world);
     FineAlignment local = survivor.alignment;
-    if (!AlignOnLocalLines(input.camera, WeakFactor(prior), &local)) continue;
-    ProjectCandidates(input.camera, local.cam_from_world, local_lines_, kMinVisiblePx, &projected_);
+    if (!last_steps_.AlignOnLocalLines(WeakFactor(prior), &local)) continue;
+    ProjectCandidates(input.camera, local.cam_from_world, last_steps_.local_lines(), kMinVisiblePx,
+                      &projected_);
     // The better of two measurements reaches by chance twice as often what one of them reaches.
     const double nats =
         evidence_meter_.Measure(projected_, segments_.table).nats - std::numbers::ln2;
@@ -493,71 +475,6 @@ double SearchMethod::EvidenceNeeded(const Rigid3& cam_from_world, double nats, u
   const double by_chance = EvidenceToBeat(num_tried);
   if (nats < by_chance || nats > kPlentyOfNats) return by_chance;
   return std::max(by_chance, kShareOfKeyFrames * expected_evidence_.LeastNear(cam_from_world));
-}
-
-bool SearchMethod::AlignOnLocalLines(const Camera& camera, const PosePriorFactor& prior,
-                                     FineAlignment* alignment) {
-  selector_.SelectLocal(camera, alignment->cam_from_world, &local_lines_);
-  if (local_lines_.size() < kMinLocalLines) return false;
-  aligner_.Begin(camera, alignment->cam_from_world, local_lines_, segments_);
-  *alignment = aligner_.Run(alignment->cam_from_world, LocalSchedule(), prior);
-  return true;
-}
-
-void SearchMethod::FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
-                                    FineAlignment* alignment) {
-  point_terms_.FindNear(input.camera, alignment->cam_from_world, all_points_, kNearPointPx,
-                        &near_rows_);
-  if (near_rows_.size() < kMinPoints) return;
-  near_points_.AssignRows(all_points_, near_rows_);
-  near_points_.ShareWeights();
-  // The aligner still holds the local lines, if there were enough.
-  if (local_lines_.size() < kMinLocalLines) {
-    SelectFineLines(input.camera, alignment->cam_from_world);
-    aligner_.Begin(input.camera, alignment->cam_from_world, fine_lines_, segments_);
-  }
-  *alignment = aligner_.Run(alignment->cam_from_world, JointSchedule(), prior, &near_points_);
-  alignment->cam_from_world =
-      aligner_.Polish(*alignment, kLineRobust, kPolishSteps, prior, near_points_);
-}
-
-void SearchMethod::FinishOneToOne(const RefineInput& input, FineAlignment* alignment) {
-  const Rigid3& pose = alignment->cam_from_world;
-  near_observations_.clear();
-  point_terms_.FindNear(input.camera, pose, all_points_, kNearPointPx, &near_rows_);
-  for (const uint32_t row : near_rows_) near_observations_.push_back(observed_points_[row]);
-  SelectFineLines(input.camera, pose);
-  ProjectCandidates(input.camera, pose, fine_lines_, kMinVisiblePx, &projected_);
-  associator_.Associate(projected_, segments_.table, kMatchGates, &pairs_);
-  lines_to_match_.clear();
-  for (const CandidateLine& line : fine_lines_) lines_to_match_.push_back(line.segment_in_world);
-  match_candidates_.clear();
-  for (const LinePair& pair : pairs_) match_candidates_.push_back({pair.segment, pair.line});
-  std::sort(match_candidates_.begin(), match_candidates_.end());
-  one_to_one_solver_.Solve(input.camera, segments_.segments, lines_to_match_, match_candidates_,
-                           near_observations_, LineResidual::kMidpointAngle,
-                           &alignment->cam_from_world);
-}
-
-void SearchMethod::ReportMatches(const Camera& camera, const Rigid3& cam_from_world,
-                                 RefineResult* result) {
-  SelectFineLines(camera, cam_from_world);
-  ProjectCandidates(camera, cam_from_world, fine_lines_, kMinVisiblePx, &projected_);
-  associator_.Associate(projected_, segments_.table, kMatchGates, &pairs_);
-  best_pair_.assign(segments_.segments.size(), -1);
-  for (size_t p = 0; p < pairs_.size(); ++p) {
-    int32_t& best = best_pair_[pairs_[p].segment];
-    if (best < 0 || pairs_[p].weight > pairs_[static_cast<size_t>(best)].weight) {
-      best = static_cast<int32_t>(p);
-    }
-  }
-  for (size_t s = 0; s < best_pair_.size(); ++s) {
-    if (best_pair_[s] < 0) continue;
-    const LinePair& pair = pairs_[static_cast<size_t>(best_pair_[s])];
-    result->matches.push_back({.segment = segments_.source[s],
-                               .line = fine_lines_[pair.line].id,
-                               .distance_px = std::sqrt(static_cast<double>(pair.square_px2))});
-  }
 }
 
 }  // namespace plumb

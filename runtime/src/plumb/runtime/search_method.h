@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "plumb/base/deadline.h"
@@ -11,13 +10,12 @@
 #include "plumb/matching/candidate_line.h"
 #include "plumb/matching/candidate_table.h"
 #include "plumb/matching/match_evidence.h"
-#include "plumb/matching/soft_association.h"
 #include "plumb/matching/support.h"
 #include "plumb/runtime/acceptance_gate.h"
 #include "plumb/runtime/expected_evidence.h"
 #include "plumb/runtime/fine_alignment.h"
+#include "plumb/runtime/last_steps.h"
 #include "plumb/runtime/line_selection.h"
-#include "plumb/runtime/one_to_one_solver.h"
 #include "plumb/runtime/point_solver.h"
 #include "plumb/runtime/pose_refiner.h"
 #include "plumb/runtime/prior_choice.h"
@@ -93,8 +91,6 @@ class SearchMethod {
   bool HoldsByPoints(const RefineInput& input, const PointPose& points) const;
   std::span<const FoundPose> FindStarts(const Trial& trial, const PosePrior& prior,
                                         uint32_t num_hypotheses);
-  /// Keeps the lines of a pose that is near enough.
-  void SelectFineLines(const Camera& camera, const Rigid3& cam_from_world);
   /// Whether work that starts now has to be left out.
   bool IsOutOfTime(double share = 1.0) { return IsOutOfTime(deadline_, share); }
   bool IsOutOfTime(const Deadline& deadline, double share);
@@ -109,24 +105,15 @@ class SearchMethod {
   /// What a pose needs to be accepted, from chance and from the map's own key frames.
   double EvidenceNeeded(const Rigid3& cam_from_world, double nats, uint32_t num_tried);
   /// The last steps of a pose that was accepted, and its covariance.
-  void Finish(const RefineInput& input, const PosePrior& prior, FineAlignment alignment,
-              RefineResult* result);
-  /// On the unfused lines of the nearest key frames. @return false when there are too few.
-  bool AlignOnLocalLines(const Camera& camera, const PosePriorFactor& prior,
-                         FineAlignment* alignment);
-  void FinishWithPoints(const RefineInput& input, const PosePriorFactor& prior,
-                        FineAlignment* alignment);
-  /// Instead of both: the paper's cost on one-to-one matches, from where the alignment ends.
-  void FinishOneToOne(const RefineInput& input, FineAlignment* alignment);
-  void ReportMatches(const Camera& camera, const Rigid3& cam_from_world, RefineResult* result);
+  void Finish(const PosePrior& prior, FineAlignment alignment, RefineResult* result);
 
   const MapIndex& index_;
   const PoseRefinerOptions options_;
   LineSelector selector_;
   FrameSegments segments_;
   std::vector<CandidateLine> search_lines_;  // visible from the prior; all supports use them
-  std::vector<CandidateLine> fine_lines_, local_lines_;
-  std::optional<Rigid3> fine_lines_pose_;  // for which fine_lines_ were selected in this frame
+  FineLines fine_lines_;
+  LastSteps last_steps_;
   std::vector<SearchLine> lines_to_find_;
   PoseSearch pose_search_;
   std::array<FoundPose, 1> only_prior_;
@@ -139,17 +126,8 @@ class SearchMethod {
   std::vector<Survivor> survivors_;
   PointSolver point_solver_;
   std::vector<PointObservation> observed_points_;
-  PointTable all_points_, near_points_;
-  PointTableAccumulator point_terms_;
-  std::vector<uint32_t> near_rows_;
+  PointTable all_points_;
   std::vector<uint32_t> key_frames_;
-  OneToOneSolver one_to_one_solver_;
-  std::vector<Segment3> lines_to_match_;  // of fine_lines_
-  std::vector<MatchCandidate> match_candidates_;
-  std::vector<PointObservation> near_observations_;
-  SoftAssociator associator_;
-  std::vector<LinePair> pairs_;
-  std::vector<int32_t> best_pair_;  // per segment
   // Of this frame:
   Rigid3 kept_;                // the pose that is returned unless a better one is found
   std::vector<Trial> trials_;  // of its priors, in their order

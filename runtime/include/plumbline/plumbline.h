@@ -373,7 +373,8 @@ typedef struct plumb_frame_result {
   double covariance[36];            /* see plumb_frame */
   double map_support;               /* share of the visible map that was found, 0..1 */
   double runner_up_ratio;           /* support of the best clearly different pose over this one's;
-                                       of other priors' poses their evidence */
+                                       evidence of other priors' poses, and where only the key
+                                       frames' own lines speak for this one */
   uint32_t num_observed_directions; /* of the pose's six, by lines and points */
   uint32_t num_segments, num_matches, num_points_used;
   int64_t wait_ns, detect_ns, ridge_ns, search_ns, refine_ns; /* stages */

@@ -135,8 +135,8 @@ struct RefineResult {
   /// How much likelier the segments are at the pose found than by chance, as a logarithm [nats]
   /// (MatchEvidence); also of poses that were refused.
   double evidence_nats = 0.0;
-  /// Support of the best clearly different pose over the winner's; of poses from other priors their
-  /// evidence over the winner's.
+  /// Support of the best clearly different pose over the winner's; evidence over evidence for poses
+  /// from other priors, and where only the key frames' own lines speak for the winner.
   double runner_up_ratio = 0.0;
   std::vector<LineMatch> matches;  // at cam_from_world
   uint32_t num_points_used = 0;

@@ -282,6 +282,7 @@ void SearchMethod::LookFarther(Trial* trial) {
   Attempt& attempt = trial->attempt;
   if (second.status == RefineStatus::kRefined && second.best.nats > attempt.best.nats) {
     attempt = second;
+    trial->prior = wide;
     return;
   }
   if (attempt.best.is_by_key_frames) AskKeyFrames(trial->input, wide);

@@ -4,9 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 
-#include "plumb/geometry/line_projection.h"
 #include "plumb/refine/cost/line_in_view.h"
 
 namespace plumb {
@@ -43,32 +41,24 @@ class LineInCameraCost {
 
   template <typename T>
   bool operator()(const T* changes, const T* delta, T* residuals) const {
-    using std::sqrt;
-    using Vector3 = Eigen::Matrix<T, 3, 1>;
-    Vector3 a, b;
+    Eigen::Matrix<T, 3, 1> a, b;
     line_.Place(delta, &a, &b);
-    const Vector3 n = a.cross(b);
-    const T min_square = kMinRaySine * kMinRaySine * a.squaredNorm() * b.squaredNorm();
-    if (!(n.template head<2>().squaredNorm() > min_square)) return false;
-    const T l0 = n.x() / focal_px_.x(), l1 = n.y() / focal_px_.y();
-    const T scale = T(1.0 / sigma_px_) / sqrt(l0 * l0 + l1 * l1);
     const Eigen::Map<const Eigen::Matrix<T, kNumCameraChanges, 1>> change(changes);
-    for (int i = 0; i < 2; ++i) {
-      const Eigen::Matrix<T, 2, 1> ray =
-          ends_[i].normalized.template cast<T>() + ends_[i].by_camera.template cast<T>() * change;
-      residuals[i] = (n.x() * ray.x() + n.y() * ray.y() + n.z()) * scale;
-    }
-    return true;
+    const auto changed = [&change](const LinearRay& ray) -> Eigen::Matrix<T, 2, 1> {
+      return ray.normalized.template cast<T>() + ray.by_camera.template cast<T>() * change;
+    };
+    return DistancesFromLine<T>(a, b, changed(start_), changed(end_), focal_px_, sigma_px_,
+                                residuals);
   }
 
  private:
   LineInCameraCost(const AnchoredSegment& line, const Eigen::Vector2d& focal_px,
                    const LinearRay& start, const LinearRay& end, double sigma_px)
-      : line_(line), focal_px_(focal_px), ends_{start, end}, sigma_px_(sigma_px) {}
+      : line_(line), focal_px_(focal_px), start_(start), end_(end), sigma_px_(sigma_px) {}
 
   const AnchoredSegment line_;
   const Eigen::Vector2d focal_px_;
-  const LinearRay ends_[2];
+  const LinearRay start_, end_;
   const double sigma_px_;
 };
 

@@ -36,6 +36,24 @@ inline AnchoredSegment AnchorOf(const Segment3& line) {
   return anchored;
 }
 
+/// Perpendicular distances of two points of the plane z = 1 to the image of the infinite line
+/// through a and b (camera frame), in pixels over `sigma_px`. @return false when the line has no
+/// image (kMinRaySine).
+template <typename T>
+bool DistancesFromLine(const Eigen::Matrix<T, 3, 1>& a, const Eigen::Matrix<T, 3, 1>& b,
+                       const Eigen::Matrix<T, 2, 1>& start, const Eigen::Matrix<T, 2, 1>& end,
+                       const Eigen::Vector2d& focal_px, double sigma_px, T* distances) {
+  using std::sqrt;
+  const Eigen::Matrix<T, 3, 1> n = a.cross(b);
+  const T min_square = kMinRaySine * kMinRaySine * a.squaredNorm() * b.squaredNorm();
+  if (!(n.template head<2>().squaredNorm() > min_square)) return false;
+  const T l0 = n.x() / focal_px.x(), l1 = n.y() / focal_px.y();
+  const T scale = T(1.0 / sigma_px) / sqrt(l0 * l0 + l1 * l1);
+  distances[0] = (n.x() * start.x() + n.y() * start.y() + n.z()) * scale;
+  distances[1] = (n.x() * end.x() + n.y() * end.y() + n.z()) * scale;
+  return true;
+}
+
 /// Perpendicular distances of a segment's ends to the projected infinite line:
 ///
 ///   r = [ d(l, p_start), d(l, p_end) ] / sigma      2 residuals, unitless
@@ -55,7 +73,7 @@ class LineInViewCost {
 
   template <typename T>
   bool operator()(const T* q_xyzw, const T* t, const T* delta, T* residuals) const {
-    using std::sqrt;
+    using Vector2 = Eigen::Matrix<T, 2, 1>;
     using Vector3 = Eigen::Matrix<T, 3, 1>;
     const Eigen::Map<const Eigen::Quaternion<T>> rotation(q_xyzw);
     const Eigen::Map<const Vector3> translation(t);
@@ -63,14 +81,8 @@ class LineInViewCost {
     line_.Place(delta, &start, &end);
     const Vector3 a = rotation * start + translation;
     const Vector3 b = rotation * end + translation;
-    const Vector3 n = a.cross(b);
-    const T min_square = kMinRaySine * kMinRaySine * a.squaredNorm() * b.squaredNorm();
-    if (!(n.template head<2>().squaredNorm() > min_square)) return false;
-    const T l0 = n.x() / focal_px_.x(), l1 = n.y() / focal_px_.y();
-    const T scale = T(1.0 / sigma_px_) / sqrt(l0 * l0 + l1 * l1);
-    residuals[0] = (n.x() * segment_.start.x() + n.y() * segment_.start.y() + n.z()) * scale;
-    residuals[1] = (n.x() * segment_.end.x() + n.y() * segment_.end.y() + n.z()) * scale;
-    return true;
+    return DistancesFromLine<T>(a, b, Vector2(segment_.start.cast<T>()),
+                                Vector2(segment_.end.cast<T>()), focal_px_, sigma_px_, residuals);
   }
 
  private:

@@ -77,6 +77,32 @@ TEST(WeakPose, IsAcceptedOnTheKeyFramesOwnLines) {
   EXPECT_GE(refined_with, kTrials * 2 / 3);
 }
 
+TEST(WeakPose, ALocalOptimumBesideTheRightPoseIsLeft) {
+  // In front of the furniture of one wall, posts that repeat: one post further many lines agree.
+  std::vector<Segment3> lines = testing::RoomLines();
+  const std::vector<Segment3> fence = testing::FenceLines(0.1);
+  lines.insert(lines.end(), fence.begin(), fence.end());
+  testing::RoomRefiner scene(lines);
+  Random random(37);
+  constexpr int kTrials = 96;
+  int refined = 0, wrong = 0;
+  for (int k = 0; k < kTrials; ++k) {
+    const double step = 0.1 * (k % 8);
+    const Rigid3 truth = LookAlong({-0.5 + step, 0.2 - 0.5 * step, 0.1}, {1.0, 0.1, -0.05});
+    const auto segments = Render(lines, truth, 1700 + k, {.missing_share = 0.4});
+    const Rigid3 prior = Disturb(truth, 0.4, 8.0 * kDegree, &random);
+    RefineInput input = InputOf(segments, prior, 0.4, 8.0 * kDegree);
+    input.seed = static_cast<uint64_t>(k);
+    const RefineResult result = scene.Refine(input);
+    if (result.status != RefineStatus::kRefined) continue;
+    ++refined;
+    wrong += DistanceBetween(result.cam_from_world, truth).position_m > 0.02;
+  }
+  // 84 and 1 of them; without a closer look 72 and 14.
+  EXPECT_GE(refined, 60);
+  EXPECT_LE(wrong, 5);
+}
+
 TEST(WeakPose, RepeatedStructureStaysAmbiguousInTheKeyFramesLines) {
   const std::vector<Segment3> lines = testing::FenceLines(0.2);
   const LineMap map = WithVagueFusedLines(MapOf(lines, RoomKeyFrames()));

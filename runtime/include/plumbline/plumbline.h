@@ -188,7 +188,8 @@ typedef struct plumb_session_options {
    * used with vulkan_host, nor by "lsd". */
   const char* device;
   const plumb_vulkan_host* vulkan_host; /* NULL: the library opens a device of its own */
-  uint32_t num_hypotheses;              /* of the search, 1..2048; 0: 1500 */
+  uint32_t num_hypotheses;              /* of the search, 1..2048; 0: 500 to 1500, by the
+                                           prior's size */
   uint32_t max_segments;                /* best detected segments to use, 1..4096; 0: 400 */
   double min_map_support;    /* least share of the visible map to accept a pose, (0, 1); 0: 0.05 */
   uint64_t seed;             /* equal inputs and seeds give equal results */

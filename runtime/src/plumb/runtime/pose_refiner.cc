@@ -31,9 +31,9 @@ std::string_view ToString(RefineStatus status) {
 }
 
 Status PoseRefinerOptions::Validate() const {
-  if (num_hypotheses < 1 || num_hypotheses > 2048) {
+  if (num_hypotheses && (*num_hypotheses < 1 || *num_hypotheses > 2048)) {
     return Error{ErrorCode::kInvalidArgument,
-                 "num_hypotheses " + std::to_string(num_hypotheses) + " is not in 1..2048"};
+                 "num_hypotheses " + std::to_string(*num_hypotheses) + " is not in 1..2048"};
   }
   if (!(min_map_support > 0.0 && min_map_support < 1.0)) {
     return Error{ErrorCode::kInvalidArgument,

@@ -68,7 +68,9 @@ struct PoseRefinerOptions {
   /// The last word on the pose. Absent: the method's own, kPerpendicular of kSearch and
   /// kMidpointAngle of kPaper; the other one is for comparisons (`plumbline eval ablation`).
   std::optional<LineResidual> residual = std::nullopt;
-  uint32_t num_hypotheses = 1500;  // of the search, 1..2048
+  /// Of the search, 1..2048. Absent: by the size of the prior, from 500 at 10 cm / 2 deg and less
+  /// to 1500 at 30 cm / 6 deg and more.
+  std::optional<uint32_t> num_hypotheses = std::nullopt;
   /// Smallest share of the visible map's length that the segments must explain, in (0, 1). Chance
   /// is judged by the evidence; this only refuses poses that are right and of no use.
   double min_map_support = 0.05;

@@ -24,17 +24,27 @@ constexpr double kSamePositionM = 0.01, kSameRotationRad = 0.005;
 
 constexpr double kSearchGain = 1.03, kStreamGain = 1.0;
 
+// Of the search; in between by the larger of both sizes.
+constexpr uint32_t kFewHypotheses = 500, kManyHypotheses = 1500;
+constexpr double kFewPositionM = 0.10, kFewRotationRad = 0.035;
+
 // A second attempt looks twice as far. A prior that was found good needs none.
 constexpr double kWideningFactor = 2.0;
 constexpr uint32_t kMaxHypotheses = 2048;
+// A pose with a smaller share of what the key frames beside it have, or of plenty where none are,
+// is looked for again close to where it was found; also one that was refused in spite of some
+// evidence.
+constexpr double kShareOfSure = 0.6;
+constexpr double kClosePositionM = 0.12, kCloseRotationRad = 0.05;
+constexpr uint32_t kCloseHypotheses = 300;
 // How far rivals of a weak pose are looked for: repeated structure does not keep to the prior.
 constexpr double kRivalFactor = 3.0;
 
 // Shares of the time budget after which no further start, attempt or last step begins.
 constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.9;
 
-// A pose needs this share of the evidence that the key frames beside it have for theirs; it is not
-// asked for when there is so much that no key frame asks for more.
+// A pose needs this share of the evidence that the key frames beside it have for theirs; they are
+// not asked when there is so much that none asks for more.
 constexpr double kShareOfKeyFrames = 0.15, kPlentyOfNats = 60.0;
 
 // A pose from points alone is a start for the lines, and with many points an answer.
@@ -93,6 +103,7 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   last_steps_.Begin({input.camera, &segments_, observed_points_, &all_points_});
   BeginTrials(input);
   WidenTrials();
+  LookCloser();
   const PriorChoice choice = Choose(input.camera);
   Trial& trial = trials_[choice.prior];
   const Attempt& attempt = trial.attempt;
@@ -129,11 +140,12 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
 void SearchMethod::BeginTrials(const RefineInput& input) {
   trials_.clear();
   const size_t num_priors = 1 + input.more_priors.size();
-  const uint32_t num_hypotheses = input.search ? options_.num_hypotheses : 1;
-  uint32_t num_tried = CountDistinctPoses(input.prior, num_hypotheses);
-  for (const PosePrior& prior : input.more_priors) {
-    num_tried += CountDistinctPoses(prior, num_hypotheses);
-  }
+  num_tried_ = 0;
+  const auto count = [&](const PosePrior& prior) {
+    num_tried_ += input.search ? CountDistinctPoses(prior, NumHypotheses(prior)) : 1;
+  };
+  count(input.prior);
+  for (const PosePrior& prior : input.more_priors) count(prior);
   for (size_t k = 0; k < num_priors; ++k) {
     if (k > 0 && IsOutOfTime(kStartsShare)) return;
     AddTrial(input, k);
@@ -143,8 +155,18 @@ void SearchMethod::BeginTrials(const RefineInput& input) {
     stages_.points_ns += watch.Lap();
     try_deadline_ =
         num_priors == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_priors - k));
-    trial.attempt = Try(trial, trial.prior, options_.num_hypotheses, num_tried, !input.search);
+    trial.attempt = Try(trial, {.prior = trial.prior,
+                                .num_hypotheses = NumHypotheses(trial.prior),
+                                .is_last = !input.search});
   }
+}
+
+uint32_t SearchMethod::NumHypotheses(const PosePrior& prior) const {
+  if (options_.num_hypotheses) return *options_.num_hypotheses;
+  const double size =
+      std::max(prior.position_sigma_m / kFewPositionM, prior.rotation_sigma_rad / kFewRotationRad);
+  return static_cast<uint32_t>(
+      std::clamp<double>(kFewHypotheses * size, kFewHypotheses, kManyHypotheses));
 }
 
 void SearchMethod::AddTrial(const RefineInput& input, size_t prior) {
@@ -171,8 +193,6 @@ bool SearchMethod::ShouldWiden(const Trial& trial) const {
 void SearchMethod::WidenTrials() {
   const auto has_succeeded = [this](const Trial& trial) { return HasSucceeded(trial); };
   if (std::any_of(trials_.begin(), trials_.end(), has_succeeded)) return;
-  const uint32_t num_hypotheses = std::min(kMaxHypotheses, 2 * options_.num_hypotheses);
-  uint32_t num_tried = 0;
   size_t num_left = 0;
   const auto widened = [](const Trial& trial) {
     PosePrior wide = trial.input.prior;
@@ -180,10 +200,12 @@ void SearchMethod::WidenTrials() {
     wide.rotation_sigma_rad *= kWideningFactor;
     return wide;
   };
+  const auto num_hypotheses = [this](const Trial& trial) {
+    return std::min(kMaxHypotheses, 2 * NumHypotheses(trial.input.prior));
+  };
   for (const Trial& trial : trials_) {
-    num_tried += CountDistinctPoses(trial.prior, options_.num_hypotheses);
     if (!ShouldWiden(trial)) continue;
-    num_tried += CountDistinctPoses(widened(trial), num_hypotheses);
+    num_tried_ += CountDistinctPoses(widened(trial), num_hypotheses(trial));
     ++num_left;
   }
   for (Trial& trial : trials_) {
@@ -192,10 +214,48 @@ void SearchMethod::WidenTrials() {
     const PosePrior wide = widened(trial);
     try_deadline_ = num_left == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_left));
     --num_left;
-    const Attempt second = Try(trial, wide, num_hypotheses, num_tried, true);
-    if (second.status != RefineStatus::kRefined) continue;
+    const Attempt second = Try(trial, {.prior = wide, .num_hypotheses = num_hypotheses(trial)});
+    if (second.status != RefineStatus::kRefined) {
+      if (second.best.nats > trial.attempt.best.nats) trial.attempt = second;
+      continue;
+    }
     trial.attempt = second;
     trial.prior = wide;
+  }
+}
+
+bool SearchMethod::IsDoubtful(const Attempt& attempt) {
+  if (!attempt.has_pose) return false;
+  const double nats = attempt.best.nats;
+  const bool is_refined = attempt.status == RefineStatus::kRefined;
+  const bool is_open =
+      attempt.status == RefineStatus::kLowSupport || attempt.status == RefineStatus::kAmbiguous;
+  if (!is_refined && !(is_open && nats > 0.0)) return false;
+  if (nats > kPlentyOfNats) return false;
+  const double sure = expected_evidence_.LeastNear(attempt.best.alignment.cam_from_world);
+  return nats < std::max(kWeakNats, kShareOfSure * (sure > 0.0 ? sure : kPlentyOfNats));
+}
+
+void SearchMethod::LookCloser() {
+  for (Trial& trial : trials_) {
+    if (!trial.input.search || HoldsByPoints(trial.input, trial.points)) continue;
+    if (!IsDoubtful(trial.attempt)) continue;
+    if (IsOutOfTime(kWideningShare)) return;
+    PosePrior close = trial.prior;
+    close.cam_from_world = trial.attempt.best.alignment.cam_from_world;
+    close.position_sigma_m = std::min(close.position_sigma_m, kClosePositionM);
+    close.rotation_sigma_rad = std::min(close.rotation_sigma_rad, kCloseRotationRad);
+    const uint32_t num_hypotheses = std::min(NumHypotheses(close), kCloseHypotheses);
+    num_tried_ += CountDistinctPoses(close, num_hypotheses);
+    try_deadline_ = deadline_;
+    const Attempt second =
+        Try(trial,
+            {.prior = close, .num_hypotheses = num_hypotheses, .is_close = true, .is_last = true});
+    if (second.status == RefineStatus::kRefined &&
+        (trial.attempt.status != RefineStatus::kRefined ||
+         second.best.nats > trial.attempt.best.nats)) {
+      trial.attempt = second;
+    }
   }
 }
 
@@ -278,7 +338,8 @@ void SearchMethod::LookFarther(Trial* trial) {
   wide.position_sigma_m *= kRivalFactor;
   wide.rotation_sigma_rad *= kRivalFactor;
   try_deadline_ = deadline_;
-  const Attempt second = Try(*trial, wide, kMaxHypotheses, kMaxHypotheses, false);
+  num_tried_ += CountDistinctPoses(wide, kMaxHypotheses);
+  const Attempt second = Try(*trial, {.prior = wide, .num_hypotheses = kMaxHypotheses});
   Attempt& attempt = trial->attempt;
   if (second.status == RefineStatus::kRefined && second.best.nats > attempt.best.nats) {
     attempt = second;
@@ -288,7 +349,7 @@ void SearchMethod::LookFarther(Trial* trial) {
   if (attempt.best.is_by_key_frames) AskKeyFrames(trial->input, wide);
   // On the lines that the wide prior sees, as the supports of the survivors.
   attempt.best.support = MeasureSupport(trial->input.camera, attempt.best.alignment.cam_from_world);
-  attempt.evidence.runner_up_ratio = RunnerUpRatio(attempt.best);
+  FindRunnerUp(&attempt);
   if (attempt.evidence.runner_up_ratio > attempt.best.MaxRunnerUpRatio()) {
     attempt.status = RefineStatus::kAmbiguous;
   }
@@ -308,8 +369,8 @@ bool SearchMethod::MayWiden(const Attempt& attempt) const {
   return false;
 }
 
-SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const PosePrior& prior,
-                                        uint32_t num_hypotheses, uint32_t num_tried, bool is_last) {
+SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const Plan& plan) {
+  const PosePrior& prior = plan.prior;
   const RefineInput& input = trial.input;
   Attempt attempt;
   attempt.best.alignment.cam_from_world = prior.cam_from_world;
@@ -321,7 +382,7 @@ SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const PosePrior& pri
   stages_.index_ns += watch.Lap();
   if (search_lines_.size() < kMinLines || segments_.segments.size() < kMinSegments) return attempt;
 
-  const std::span<const FoundPose> starts = FindStarts(trial, prior, num_hypotheses);
+  const std::span<const FoundPose> starts = FindStarts(trial, plan);
   search_ns_ += watch.Lap();
   const auto schedule = input.search ? FineSchedule() : StreamSchedule();
   const auto align_from = [&](const Rigid3& start) {
@@ -349,7 +410,9 @@ SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const PosePrior& pri
     align_from(start.cam_from_world);
   }
   if (trial.points.num_inliers >= kMinSolvingPoints) align_from(trial.points.cam_from_world);
+  // What earlier attempts have found, the rival with it.
   if (trial.attempt.has_pose) align_from(trial.attempt.best.alignment.cam_from_world);
+  if (trial.attempt.runner_up) align_from(*trial.attempt.runner_up);
   if (survivors_.empty()) return attempt;
   attempt.has_pose = true;
   watch.Lap();
@@ -357,39 +420,38 @@ SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const PosePrior& pri
       survivors_.begin(), survivors_.end(),
       [](const Survivor& a, const Survivor& b) { return a.support.Value() < b.support.Value(); });
   best.fused_nats = best.nats = FusedEvidence(input.camera, best.alignment.cam_from_world);
-  Judge(input, prior, num_tried, best, &attempt);
+  Judge(input, prior, best, &attempt);
   const bool is_open = attempt.status == RefineStatus::kLowSupport ||
                        (attempt.status == RefineStatus::kAmbiguous && best.IsWeak());
-  if (is_last && is_open && !IsOutOfTime(kLastStepsShare)) {
+  if (plan.is_last && is_open && !IsOutOfTime(kLastStepsShare)) {
     const Survivor& other = AskKeyFrames(input, prior);
-    if (other.is_by_key_frames) Judge(input, prior, num_tried, other, &attempt);
+    if (other.is_by_key_frames) Judge(input, prior, other, &attempt);
   }
   stages_.support_ns += watch.Lap();
   return attempt;
 }
 
-void SearchMethod::Judge(const RefineInput& input, const PosePrior& prior, uint32_t num_tried,
-                         const Survivor& best, Attempt* attempt) {
+void SearchMethod::Judge(const RefineInput& input, const PosePrior& prior, const Survivor& best,
+                         Attempt* attempt) {
   attempt->best = best;
   const FineAlignment& found = best.alignment;
   attempt->evidence = {.refined = best.support,
                        .prior = MeasureSupport(input.camera, kept_),
-                       .runner_up_ratio = RunnerUpRatio(best),
                        .is_near_prior = IsPlausible(found.cam_from_world, input.prior),
                        .evidence_nats = best.nats,
                        .num_observed_directions = CountObservedDirections(
                            found.line_information / std::max(found.residual_scale, 1.0), prior)};
-  attempt->status =
-      Decide(attempt->evidence,
-             {.min_map_support = options_.min_map_support,
-              .min_evidence_nats = EvidenceNeeded(found.cam_from_world, best.nats, num_tried),
-              .max_runner_up_ratio = best.MaxRunnerUpRatio(),
-              .min_gain = input.search ? kSearchGain : kStreamGain,
-              .needs_all_directions = input.search});
+  FindRunnerUp(attempt);
+  attempt->status = Decide(attempt->evidence,
+                           {.min_map_support = options_.min_map_support,
+                            .min_evidence_nats = EvidenceNeeded(found.cam_from_world, best.nats),
+                            .max_runner_up_ratio = best.MaxRunnerUpRatio(),
+                            .min_gain = input.search ? kSearchGain : kStreamGain,
+                            .needs_all_directions = input.search});
 }
 
-std::span<const FoundPose> SearchMethod::FindStarts(const Trial& trial, const PosePrior& prior,
-                                                    uint32_t num_hypotheses) {
+std::span<const FoundPose> SearchMethod::FindStarts(const Trial& trial, const Plan& plan) {
+  const PosePrior& prior = plan.prior;
   const RefineInput& input = trial.input;
   if (!input.search) {
     only_prior_[0] = {prior.cam_from_world, 0.0};
@@ -405,8 +467,10 @@ std::span<const FoundPose> SearchMethod::FindStarts(const Trial& trial, const Po
     is_image_set_ = true;
     stages_.field_ns = watch.Lap();
   }
-  PoseSearchOptions search{
-      .num_hypotheses = num_hypotheses, .num_survivors = kMaxSurvivors, .deadline = try_deadline_};
+  PoseSearchOptions search{.num_hypotheses = plan.num_hypotheses,
+                           .num_survivors = kMaxSurvivors,
+                           .deadline = try_deadline_};
+  if (plan.is_close) search.num_wide = 0;
   if (HoldsByPoints(input, trial.points)) {
     search.num_aligned = kAlignedBesidePoints;
     search.num_wide = 0;
@@ -417,7 +481,7 @@ std::span<const FoundPose> SearchMethod::FindStarts(const Trial& trial, const Po
   const PoseSearchTimes& times = pose_search_.times();
   stages_.score_ns += times.draw_ns + times.score_ns;
   stages_.coarse_ns += times.align_ns;
-  stages_.num_hypotheses += num_hypotheses;
+  stages_.num_hypotheses += plan.num_hypotheses;
   return found;
 }
 
@@ -458,22 +522,26 @@ const SearchMethod::Survivor& SearchMethod::AskKeyFrames(const RefineInput& inpu
                            [](const Survivor& a, const Survivor& b) { return a.nats < b.nats; });
 }
 
-double SearchMethod::RunnerUpRatio(const Survivor& best) const {
+void SearchMethod::FindRunnerUp(Attempt* attempt) const {
+  const Survivor& best = attempt->best;
   const auto value = [&best](const Survivor& survivor) {
     return best.is_by_key_frames ? survivor.nats : survivor.support.Value();
   };
-  if (!(value(best) > 0.0)) return 0.0;
-  double runner_up = 0.0;
+  attempt->evidence.runner_up_ratio = 0.0;
+  attempt->runner_up.reset();
+  if (!(value(best) > 0.0)) return;
   for (const Survivor& other : survivors_) {
-    if (IsClearlyDifferent(other.alignment.cam_from_world, best.alignment.cam_from_world)) {
-      runner_up = std::max(runner_up, value(other));
-    }
+    const Rigid3& pose = other.alignment.cam_from_world;
+    if (!IsClearlyDifferent(pose, best.alignment.cam_from_world)) continue;
+    const double ratio = value(other) / value(best);
+    if (attempt->runner_up && ratio <= attempt->evidence.runner_up_ratio) continue;
+    attempt->evidence.runner_up_ratio = ratio;
+    attempt->runner_up = pose;
   }
-  return runner_up / value(best);
 }
 
-double SearchMethod::EvidenceNeeded(const Rigid3& cam_from_world, double nats, uint32_t num_tried) {
-  const double by_chance = EvidenceToBeat(num_tried);
+double SearchMethod::EvidenceNeeded(const Rigid3& cam_from_world, double nats) {
+  const double by_chance = EvidenceToBeat(num_tried_);
   if (nats < by_chance || nats > kPlentyOfNats) return by_chance;
   return std::max(by_chance, kShareOfKeyFrames * expected_evidence_.LeastNear(cam_from_world));
 }

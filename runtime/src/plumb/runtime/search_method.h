@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "plumb/base/deadline.h"
@@ -54,6 +55,14 @@ class SearchMethod {
     bool has_pose = false;  // something was found, whatever it is worth
     GateEvidence evidence;
     Survivor best;
+    std::optional<Rigid3> runner_up;  // the best pose that is clearly different
+  };
+  /// How an attempt searches.
+  struct Plan {
+    PosePrior prior;
+    uint32_t num_hypotheses = 1;
+    bool is_close = false;  // around a pose that was found: wide alignment would lead back to it
+    bool is_last = false;  // the key frames' own lines are asked for what the fused ones leave open
   };
   /// What was tried around one of the frame's priors.
   struct Trial {
@@ -70,15 +79,17 @@ class SearchMethod {
   void WidenTrials();
   bool HasSucceeded(const Trial& trial) const;
   bool ShouldWiden(const Trial& trial) const;
+  /// Searches close to what was found around each prior, where the map's key frames have much more
+  /// evidence for their poses: a local optimum beside the right pose explains many lines, too.
+  void LookCloser();
+  bool IsDoubtful(const Attempt& attempt);
+  /// To draw from a prior of this size.
+  uint32_t NumHypotheses(const PosePrior& prior) const;
   PriorChoice Choose(const Camera& camera);
-  /// @param num_tried  Poses that the frame has tried in the end, for EvidenceToBeat().
-  /// @param is_last    No other attempt follows: the key frames' own lines are asked for what the
-  ///                   fused ones leave open.
-  Attempt Try(const Trial& trial, const PosePrior& prior, uint32_t num_hypotheses,
-              uint32_t num_tried, bool is_last);
+  Attempt Try(const Trial& trial, const Plan& plan);
   /// Decides on a survivor. @param attempt  Its verdict is replaced.
-  void Judge(const RefineInput& input, const PosePrior& prior, uint32_t num_tried,
-             const Survivor& best, Attempt* attempt);
+  void Judge(const RefineInput& input, const PosePrior& prior, const Survivor& best,
+             Attempt* attempt);
   /// Whether a search with a larger uncertainty can still help.
   bool MayWiden(const Attempt& attempt) const;
   /// Searches farther off than the prior says, for a pose that has been accepted on little
@@ -89,8 +100,7 @@ class SearchMethod {
   /// Solves the pose from the points alone, if there are enough.
   PointPose SolvePoints(const RefineInput& input);
   bool HoldsByPoints(const RefineInput& input, const PointPose& points) const;
-  std::span<const FoundPose> FindStarts(const Trial& trial, const PosePrior& prior,
-                                        uint32_t num_hypotheses);
+  std::span<const FoundPose> FindStarts(const Trial& trial, const Plan& plan);
   /// Whether work that starts now has to be left out.
   bool IsOutOfTime(double share = 1.0) { return IsOutOfTime(deadline_, share); }
   bool IsOutOfTime(const Deadline& deadline, double share);
@@ -99,11 +109,11 @@ class SearchMethod {
   /// Aligns all survivors on the key frames' own lines as well and takes the pose that these lead
   /// to where they have more evidence than the fused lines. @return the one with the most evidence.
   const Survivor& AskKeyFrames(const RefineInput& input, const PosePrior& prior);
-  /// Support of the best clearly different survivor over that of `best`; evidence over evidence
-  /// where `best` is by key frames.
-  double RunnerUpRatio(const Survivor& best) const;
+  /// The clearly different survivor with the most support over that of `best`; evidence over
+  /// evidence where `best` is by key frames.
+  void FindRunnerUp(Attempt* attempt) const;
   /// What a pose needs to be accepted, from chance and from the map's own key frames.
-  double EvidenceNeeded(const Rigid3& cam_from_world, double nats, uint32_t num_tried);
+  double EvidenceNeeded(const Rigid3& cam_from_world, double nats);
   /// The last steps of a pose that was accepted, and its covariance.
   void Finish(const PosePrior& prior, FineAlignment alignment, RefineResult* result);
 
@@ -132,6 +142,7 @@ class SearchMethod {
   Rigid3 kept_;                // the pose that is returned unless a better one is found
   std::vector<Trial> trials_;  // of its priors, in their order
   std::vector<PriorOutcome> outcomes_;
+  uint32_t num_tried_ = 0;     // poses that can be told apart, in all attempts until now
   bool is_image_set_ = false;  // of pose_search_
   int64_t search_ns_ = 0;
   RefineStages stages_;

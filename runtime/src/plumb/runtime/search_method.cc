@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "plumb/base/stopwatch.h"
 #include "plumb/refine/uncertainty.h"
@@ -13,16 +12,12 @@ namespace plumb {
 namespace {
 
 constexpr size_t kMaxSegments = 250;
-// Three lines determine a pose, a fourth one can contradict it.
-constexpr size_t kMinLines = 4, kMinSegments = 4;
 
 // The prior is a weak factor of the alignment: it decides only what the lines leave open.
 constexpr double kPriorFactorScale = 2.0;
 
-// Aligned half way, poses nearer than this end at the same place.
-constexpr double kSamePositionM = 0.01, kSameRotationRad = 0.005;
-
-constexpr double kSearchGain = 1.03, kStreamGain = 1.0;
+// A pose that so many points hold is an answer.
+constexpr size_t kMinDecidingPoints = 40;
 
 // Of the search; in between by the larger of both sizes.
 constexpr uint32_t kFewHypotheses = 500, kManyHypotheses = 1500;
@@ -31,52 +26,18 @@ constexpr double kFewPositionM = 0.10, kFewRotationRad = 0.035;
 // A second attempt looks twice as far. A prior that was found good needs none.
 constexpr double kWideningFactor = 2.0;
 constexpr uint32_t kMaxHypotheses = 2048;
+
 // A pose with a smaller share of what the key frames beside it have, or of plenty where none are,
 // is looked for again close to where it was found; also one that was refused in spite of some
 // evidence.
 constexpr double kShareOfSure = 0.6;
 constexpr double kClosePositionM = 0.12, kCloseRotationRad = 0.05;
 constexpr uint32_t kCloseHypotheses = 300;
+
 // How far rivals of a weak pose are looked for: repeated structure does not keep to the prior.
 constexpr double kRivalFactor = 3.0;
 
-// Shares of the time budget after which no further start, attempt or last step begins.
-constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.9;
-
-// A pose needs this share of the evidence that the key frames beside it have for theirs; they are
-// not asked when there is so much that none asks for more.
-constexpr double kShareOfKeyFrames = 0.15, kPlentyOfNats = 60.0;
-
-// A pose from points alone is a start for the lines, and with many points an answer.
-constexpr size_t kMinSolvingPoints = 12, kMinDecidingPoints = 40;
-// Beside points that decide, the search has only to contradict them: its best pose out of so many.
-constexpr size_t kAlignedBesidePoints = 12;
-
 constexpr double kMinScale = 0.02;  // of residuals: perfect input must not divide by zero
-
-bool IsSame(const Rigid3& a_from_world, const Rigid3& b_from_world) {
-  const PoseDistance distance = DistanceBetween(a_from_world, b_from_world);
-  return distance.position_m < kSamePositionM && distance.rotation_rad < kSameRotationRad;
-}
-
-PosePriorFactor WeakFactor(const PosePrior& prior) {
-  PosePriorFactor factor{prior.cam_from_world, kPriorFactorScale * prior.rotation_sigma_rad,
-                         kPriorFactorScale * prior.position_sigma_m};
-  if (prior.gravity) {
-    factor.tilt =
-        TiltPrior{prior.gravity->down_in_camera, kPriorFactorScale * prior.gravity->sigma_rad};
-  }
-  return factor;
-}
-
-SearchRegion RegionOf(const PosePrior& prior) {
-  SearchRegion region{prior.cam_from_world, prior.rotation_sigma_rad, prior.position_sigma_m};
-  if (prior.gravity) {
-    region.down_in_camera = prior.gravity->down_in_camera.cast<float>();
-    region.tilt_sigma_rad = prior.gravity->sigma_rad;
-  }
-  return region;
-}
 
 Matrix6d PriorInformation(const PosePrior& prior) { return CovarianceOf(prior).inverse(); }
 
@@ -369,181 +330,20 @@ bool SearchMethod::MayWiden(const Attempt& attempt) const {
   return false;
 }
 
-SearchMethod::Attempt SearchMethod::Try(const Trial& trial, const Plan& plan) {
-  const PosePrior& prior = plan.prior;
-  const RefineInput& input = trial.input;
-  Attempt attempt;
-  attempt.best.alignment.cam_from_world = prior.cam_from_world;
-  survivors_.clear();
-  Stopwatch watch;
-  selector_.SelectForSearch(input.camera, prior.cam_from_world, prior.rotation_sigma_rad,
-                            &search_lines_);
-  search_table_.Assign(search_lines_, prior.cam_from_world);
-  stages_.index_ns += watch.Lap();
-  if (search_lines_.size() < kMinLines || segments_.segments.size() < kMinSegments) return attempt;
-
-  const std::span<const FoundPose> starts = FindStarts(trial, plan);
-  search_ns_ += watch.Lap();
-  const auto schedule = input.search ? FineSchedule() : StreamSchedule();
-  const auto align_from = [&](const Rigid3& start) {
-    watch.Lap();
-    const std::vector<CandidateLine>& lines = fine_lines_.Near(input.camera, start);
-    stages_.index_ns += watch.Lap();
-    if (lines.size() < kMinLines) return;
-    aligner_.Begin(input.camera, start, lines, segments_);
-    // Half way it shows whether a start leads to an answer that is already there.
-    const size_t half = schedule.size() / 2;
-    const Rigid3 half_way =
-        aligner_.Run(start, schedule.first(half), WeakFactor(prior)).cam_from_world;
-    stages_.fine_ns += watch.Lap();
-    for (const Survivor& other : survivors_) {
-      if (IsSame(half_way, other.alignment.cam_from_world)) return;
-    }
-    Survivor& survivor = survivors_.emplace_back();
-    survivor.alignment = aligner_.Run(half_way, schedule.subspan(half), WeakFactor(prior));
-    stages_.fine_ns += watch.Lap();
-    survivor.support = MeasureSupport(input.camera, survivor.alignment.cam_from_world);
-    stages_.support_ns += watch.Lap();
-  };
-  for (const FoundPose& start : starts) {
-    if (!survivors_.empty() && IsOutOfTime(try_deadline_, kStartsShare)) break;
-    align_from(start.cam_from_world);
+PosePriorFactor SearchMethod::WeakFactor(const PosePrior& prior) {
+  PosePriorFactor factor{prior.cam_from_world, kPriorFactorScale * prior.rotation_sigma_rad,
+                         kPriorFactorScale * prior.position_sigma_m};
+  if (prior.gravity) {
+    factor.tilt =
+        TiltPrior{prior.gravity->down_in_camera, kPriorFactorScale * prior.gravity->sigma_rad};
   }
-  if (trial.points.num_inliers >= kMinSolvingPoints) align_from(trial.points.cam_from_world);
-  // What earlier attempts have found, the rival with it.
-  if (trial.attempt.has_pose) align_from(trial.attempt.best.alignment.cam_from_world);
-  if (trial.attempt.runner_up) align_from(*trial.attempt.runner_up);
-  if (survivors_.empty()) return attempt;
-  attempt.has_pose = true;
-  watch.Lap();
-  Survivor& best = *std::max_element(
-      survivors_.begin(), survivors_.end(),
-      [](const Survivor& a, const Survivor& b) { return a.support.Value() < b.support.Value(); });
-  best.fused_nats = best.nats = FusedEvidence(input.camera, best.alignment.cam_from_world);
-  Judge(input, prior, best, &attempt);
-  const bool is_open = attempt.status == RefineStatus::kLowSupport ||
-                       (attempt.status == RefineStatus::kAmbiguous && best.IsWeak());
-  if (plan.is_last && is_open && !IsOutOfTime(kLastStepsShare)) {
-    const Survivor& other = AskKeyFrames(input, prior);
-    if (other.is_by_key_frames) Judge(input, prior, other, &attempt);
-  }
-  stages_.support_ns += watch.Lap();
-  return attempt;
-}
-
-void SearchMethod::Judge(const RefineInput& input, const PosePrior& prior, const Survivor& best,
-                         Attempt* attempt) {
-  attempt->best = best;
-  const FineAlignment& found = best.alignment;
-  attempt->evidence = {.refined = best.support,
-                       .prior = MeasureSupport(input.camera, kept_),
-                       .is_near_prior = IsPlausible(found.cam_from_world, input.prior),
-                       .evidence_nats = best.nats,
-                       .num_observed_directions = CountObservedDirections(
-                           found.line_information / std::max(found.residual_scale, 1.0), prior)};
-  FindRunnerUp(attempt);
-  attempt->status = Decide(attempt->evidence,
-                           {.min_map_support = options_.min_map_support,
-                            .min_evidence_nats = EvidenceNeeded(found.cam_from_world, best.nats),
-                            .max_runner_up_ratio = best.MaxRunnerUpRatio(),
-                            .min_gain = input.search ? kSearchGain : kStreamGain,
-                            .needs_all_directions = input.search});
-}
-
-std::span<const FoundPose> SearchMethod::FindStarts(const Trial& trial, const Plan& plan) {
-  const PosePrior& prior = plan.prior;
-  const RefineInput& input = trial.input;
-  if (!input.search) {
-    only_prior_[0] = {prior.cam_from_world, 0.0};
-    return only_prior_;
-  }
-  lines_to_find_.clear();
-  for (const CandidateLine& line : search_lines_) {
-    lines_to_find_.push_back({line.segment_in_world, line.weight});
-  }
-  if (!is_image_set_) {
-    Stopwatch watch;
-    pose_search_.SetImage(input.camera, segments_.segments);
-    is_image_set_ = true;
-    stages_.field_ns = watch.Lap();
-  }
-  PoseSearchOptions search{.num_hypotheses = plan.num_hypotheses,
-                           .num_survivors = kMaxSurvivors,
-                           .deadline = try_deadline_};
-  if (plan.is_close) search.num_wide = 0;
-  if (HoldsByPoints(input, trial.points)) {
-    search.num_aligned = kAlignedBesidePoints;
-    search.num_wide = 0;
-    search.num_survivors = 1;
-  }
-  const std::span<const FoundPose> found = pose_search_.Search(
-      RegionOf(prior), lines_to_find_, search, MixSeeds(options_.seed, input.seed));
-  const PoseSearchTimes& times = pose_search_.times();
-  stages_.score_ns += times.draw_ns + times.score_ns;
-  stages_.coarse_ns += times.align_ns;
-  stages_.num_hypotheses += plan.num_hypotheses;
-  return found;
+  return factor;
 }
 
 bool SearchMethod::IsOutOfTime(const Deadline& deadline, double share) {
   if (!deadline.HasPassed(share)) return false;
   stages_.out_of_time = true;
   return true;
-}
-
-PoseSupport SearchMethod::MeasureSupport(const Camera& camera, const Rigid3& cam_from_world) {
-  ProjectTable(camera, cam_from_world, search_table_, kMinVisiblePx, &projected_);
-  return support_meter_.Measure(projected_, segments_.table);
-}
-
-double SearchMethod::FusedEvidence(const Camera& camera, const Rigid3& cam_from_world) {
-  ProjectCandidates(camera, cam_from_world, search_lines_, kMinVisiblePx, &projected_);
-  return evidence_meter_.Measure(projected_, segments_.table).nats;
-}
-
-const SearchMethod::Survivor& SearchMethod::AskKeyFrames(const RefineInput& input,
-                                                         const PosePrior& prior) {
-  for (Survivor& survivor : survivors_) {
-    survivor.fused_nats = survivor.nats =
-        FusedEvidence(input.camera, survivor.alignment.cam_from_world);
-    FineAlignment local = survivor.alignment;
-    if (!last_steps_.AlignOnLocalLines(WeakFactor(prior), &local)) continue;
-    ProjectCandidates(input.camera, local.cam_from_world, last_steps_.local_lines(), kMinVisiblePx,
-                      &projected_);
-    // The better of two measurements reaches by chance twice as often what one of them reaches.
-    const double nats =
-        evidence_meter_.Measure(projected_, segments_.table).nats - std::numbers::ln2;
-    if (!(nats > survivor.nats)) continue;
-    survivor.nats = nats;
-    survivor.alignment = local;
-    survivor.is_by_key_frames = true;
-  }
-  return *std::max_element(survivors_.begin(), survivors_.end(),
-                           [](const Survivor& a, const Survivor& b) { return a.nats < b.nats; });
-}
-
-void SearchMethod::FindRunnerUp(Attempt* attempt) const {
-  const Survivor& best = attempt->best;
-  const auto value = [&best](const Survivor& survivor) {
-    return best.is_by_key_frames ? survivor.nats : survivor.support.Value();
-  };
-  attempt->evidence.runner_up_ratio = 0.0;
-  attempt->runner_up.reset();
-  if (!(value(best) > 0.0)) return;
-  for (const Survivor& other : survivors_) {
-    const Rigid3& pose = other.alignment.cam_from_world;
-    if (!IsClearlyDifferent(pose, best.alignment.cam_from_world)) continue;
-    const double ratio = value(other) / value(best);
-    if (attempt->runner_up && ratio <= attempt->evidence.runner_up_ratio) continue;
-    attempt->evidence.runner_up_ratio = ratio;
-    attempt->runner_up = pose;
-  }
-}
-
-double SearchMethod::EvidenceNeeded(const Rigid3& cam_from_world, double nats) {
-  const double by_chance = EvidenceToBeat(num_tried_);
-  if (nats < by_chance || nats > kPlentyOfNats) return by_chance;
-  return std::max(by_chance, kShareOfKeyFrames * expected_evidence_.LeastNear(cam_from_world));
 }
 
 }  // namespace plumb

@@ -26,8 +26,8 @@ namespace plumb {
 
 /// One per PoseRefiner; input must have been checked. Owns all work space. Each of several priors
 /// is searched as if it were the only one, those without success once more and farther off when
-/// none has any; ChoosePrior() decides between what was found. Source: docs/method/association.md,
-/// "search".
+/// none has any; ChoosePrior() decides between what was found. Which attempts a frame makes is in
+/// search_method.cc, one attempt in search_attempt.cc. Source: docs/method/association.md, "search".
 class SearchMethod {
  public:
   SearchMethod(const MapIndex& index, const PoseRefinerOptions& options);
@@ -36,6 +36,12 @@ class SearchMethod {
 
  private:
   static constexpr size_t kMaxSurvivors = 4;
+  /// Shares of the time budget after which no further start, attempt or last step begins.
+  static constexpr double kStartsShare = 0.75, kWideningShare = 0.4, kLastStepsShare = 0.9;
+  /// So much evidence that no key frame asks for more.
+  static constexpr double kPlentyOfNats = 60.0;
+  /// A pose from so many points is a start for the lines.
+  static constexpr size_t kMinSolvingPoints = 12;
 
   /// A pose that the search has led to.
   struct Survivor {
@@ -96,6 +102,8 @@ class SearchMethod {
   /// evidence: takes one with more, and makes the trial ambiguous when another place has nearly as
   /// much.
   void LookFarther(Trial* trial);
+  /// The prior as a factor of the alignment: it decides only what the lines leave open.
+  static PosePriorFactor WeakFactor(const PosePrior& prior);
   void AcceptPoints(const RefineInput& input);
   /// Solves the pose from the points alone, if there are enough.
   PointPose SolvePoints(const RefineInput& input);

@@ -27,7 +27,8 @@ namespace plumb {
 /// One per PoseRefiner; input must have been checked. Owns all work space. Each of several priors
 /// is searched as if it were the only one, those without success once more and farther off when
 /// none has any; ChoosePrior() decides between what was found. Which attempts a frame makes is in
-/// search_method.cc, one attempt in search_attempt.cc. Source: docs/method/association.md, "search".
+/// search_method.cc, one attempt in search_attempt.cc. Source: docs/method/association.md,
+/// "search".
 class SearchMethod {
  public:
   SearchMethod(const MapIndex& index, const PoseRefinerOptions& options);

@@ -127,6 +127,24 @@ TEST(PoseRefiner, GravityFindsWhatFewHypothesesMiss) {
   EXPECT_GT(found_with, kTrials * 3 / 4);
 }
 
+TEST(PoseRefiner, DrawsMoreHypothesesFromALargerPrior) {
+  Scene scene(testing::RoomLines()), fixed(testing::RoomLines(), {.num_hypotheses = 700});
+  const auto segments = Render(scene.lines, QueryPose(2), 650);
+  const auto drawn = [&](Scene& of, double position_m, double rotation_deg) {
+    Random random(12);
+    const Rigid3 prior = Disturb(QueryPose(2), 0.04, 1.0 * kDegree, &random);
+    const RefineResult result =
+        of.Refine(InputOf(segments, prior, position_m, rotation_deg * kDegree));
+    EXPECT_EQ(ToString(result.status), "REFINED");
+    return result.stages.num_hypotheses;
+  };
+  EXPECT_EQ(drawn(scene, 0.05, 1.0), 500u);
+  EXPECT_EQ(drawn(scene, 0.20, 2.0), 1000u);
+  EXPECT_NEAR(drawn(scene, 0.05, 4.0), 1000.0, 5.0);
+  EXPECT_EQ(drawn(scene, 0.40, 8.0), 1500u);
+  EXPECT_EQ(drawn(fixed, 0.40, 8.0), 700u);
+}
+
 TEST(PoseRefiner, NoSegmentsIsLowSupport) {
   Scene scene(testing::RoomLines());
   const RefineResult result = scene.Refine(InputOf({}, QueryPose(0)));

@@ -147,13 +147,17 @@ bool SearchMethod::HasSucceeded(const Trial& trial) const {
          (trial.attempt.status == RefineStatus::kKeptPrior && !MayWiden(trial.attempt));
 }
 
+bool SearchMethod::HasAnySucceeded() const {
+  return std::any_of(trials_.begin(), trials_.end(),
+                     [this](const Trial& trial) { return HasSucceeded(trial); });
+}
+
 bool SearchMethod::ShouldWiden(const Trial& trial) const {
   return trial.input.search && MayWiden(trial.attempt);
 }
 
 void SearchMethod::WidenTrials() {
-  const auto has_succeeded = [this](const Trial& trial) { return HasSucceeded(trial); };
-  if (std::any_of(trials_.begin(), trials_.end(), has_succeeded)) return;
+  if (HasAnySucceeded()) return;
   size_t num_left = 0;
   const auto widened = [](const Trial& trial) {
     PosePrior wide = trial.input.prior;
@@ -198,8 +202,10 @@ bool SearchMethod::IsDoubtful(const Attempt& attempt) {
 }
 
 void SearchMethod::LookCloser() {
+  const bool has_any_succeeded = HasAnySucceeded();
   for (Trial& trial : trials_) {
     if (!trial.input.search || HoldsByPoints(trial.input, trial.points)) continue;
+    if (has_any_succeeded && trial.attempt.status != RefineStatus::kRefined) continue;
     if (!IsDoubtful(trial.attempt)) continue;
     if (IsOutOfTime(kWideningShare)) return;
     PosePrior close = trial.prior;

@@ -85,9 +85,11 @@ class SearchMethod {
   /// Searches farther off around every prior where that can help, unless one has succeeded.
   void WidenTrials();
   bool HasSucceeded(const Trial& trial) const;
+  bool HasAnySucceeded() const;
   bool ShouldWiden(const Trial& trial) const;
   /// Searches close to what was found around each prior, where the map's key frames have much more
-  /// evidence for their poses: a local optimum beside the right pose explains many lines, too.
+  /// evidence for their poses: a local optimum beside the right pose explains many lines, too. What
+  /// was refused is looked at only while nothing has succeeded.
   void LookCloser();
   bool IsDoubtful(const Attempt& attempt);
   /// To draw from a prior of this size.

@@ -21,6 +21,9 @@ const std::filesystem::path kRoot = "../shared/data/correspondences";
 constexpr double kDisplacementShare = 0.02, kDisplacementDeg = 2.0;
 constexpr int kTrialsPerView = 20;
 constexpr double kConvergedPx = 0.35;
+// The lines are fits to long edges, nearer to the truth than points are: 0.07 to 0.28 px (median)
+// from where they alone put the camera.
+constexpr double kLineVariancePx2 = 0.14 * 0.14;
 
 struct View {
   Camera camera;
@@ -64,7 +67,8 @@ View ReadView(const nlohmann::json& scene, const nlohmann::json& json) {
     const auto& ends = scene["lines3d"][line["id"].get<size_t>()];
     const Segment3 in_world{Vector3(ends), Vector3(ends, 3)};
     depths.push_back((view.cam_from_world * in_world.Midpoint()).z());
-    view.lines.push_back({in_world, {pixel(line["xyxy"]), pixel(line["xyxy"], 2)}, 1.0, 0.5});
+    view.lines.push_back(
+        {in_world, {pixel(line["xyxy"]), pixel(line["xyxy"], 2)}, 1.0, kLineVariancePx2});
   }
   for (const auto& point : json["points"]) {
     PointObservation& observation = view.points.emplace_back();
@@ -88,14 +92,16 @@ double PerpendicularPx(const View& view, const Rigid3& pose) {
   return Median(distances);
 }
 
-/// Wide loss first: the displacement moves the image by tens of pixels.
+/// Wide loss first: the displacement moves the image by tens of pixels. None of the lines is wrong,
+/// so their loss stays wide.
 Rigid3 Solve(const View& view, Rigid3 pose, bool with_points) {
   for (const double robust : {100.0, 10.0, 3.0}) {
     const auto solution = SolveOverlapCost(
         view.camera, pose, view.lines,
         with_points ? std::span<const PointObservation>(view.points)
                     : std::span<const PointObservation>(),
-        nullptr, {.line_robust = robust, .point_robust = robust, .max_iterations = 50});
+        nullptr,
+        {.line_robust = std::max(robust, 10.0), .point_robust = robust, .max_iterations = 50});
     if (!solution) return pose;
     pose = solution->cam_from_world;
   }
@@ -117,9 +123,6 @@ TEST_P(VggScene, ADisplacedPoseComesBack) {
   int trials = 0, converged_lines = 0, converged_joint = 0;
   for (const auto& json : scene["views"]) {
     const View view = ReadView(scene, json);
-    // In three views the points hold the pose where the reconstruction has it, and its own lines
-    // are farther off there.
-    const double joint_px = std::max(kConvergedPx, PerpendicularPx(view, view.cam_from_world));
     for (int trial = 0; trial < kTrialsPerView; ++trial, ++trials) {
       const Rigid3& pose = view.cam_from_world;
       const Eigen::Quaterniond rotation =
@@ -131,7 +134,7 @@ TEST_P(VggScene, ADisplacedPoseComesBack) {
       const double lines = PerpendicularPx(view, Solve(view, start, false));
       const double joint = PerpendicularPx(view, Solve(view, start, true));
       converged_lines += lines <= kConvergedPx;
-      converged_joint += joint <= joint_px;
+      converged_joint += joint <= kConvergedPx;
     }
   }
   EXPECT_GE(converged_lines, 0.99 * trials) << "of " << trials;

@@ -7,12 +7,12 @@ target_compile_options(plumb_flags INTERFACE
   $<$<CXX_COMPILER_ID:GNU,Clang>:-Wall -Wextra -Wpedantic -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wconversion -Wno-sign-conversion>>
   # False positives of GCC 12 on literal + std::string (GCC bug 105651).
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>
-  # Sanitizers make GCC see uses of what is not initialized in std::optional.
-  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${PLUMB_SANITIZE}>>:-Wno-maybe-uninitialized>
   $<$<BOOL:${PLUMB_WERROR}>:-Werror>)
 if(PLUMB_SANITIZE)  # Directory-wide: every object in a process must agree on it.
   add_compile_options(-fsanitize=${PLUMB_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${PLUMB_SANITIZE})
+  # They make GCC see uses of what is not initialized in std::optional.
+  target_compile_options(plumb_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
 
 # plumb_add_module(geometry SOURCES a.cc HEADERS a.h PUBLIC plumb::base PRIVATE Ceres::ceres)

@@ -27,6 +27,11 @@ inline constexpr double kMaxRunnerUpRatio = 0.97;
 /// (docs/adr/0008).
 inline constexpr double kWeakNats = 15.0, kWeakRunnerUpRatio = 0.85;
 
+/// The largest share that a rival may have of a pose with so much evidence.
+inline double MaxRunnerUpRatio(double evidence_nats) {
+  return evidence_nats < kWeakNats ? kWeakRunnerUpRatio : kMaxRunnerUpRatio;
+}
+
 struct GateOptions {
   double min_map_support = 0.05;
   /// EvidenceToBeat() of the poses that were tried.

@@ -48,10 +48,7 @@ PriorChoice ChoosePrior(std::span<const PriorOutcome> outcomes) {
     if (k != choice.prior) rival = std::max(rival, RivalRatio(chosen, outcomes[k]));
   }
   choice.runner_up_ratio = std::max(choice.runner_up_ratio, rival);
-  const bool is_weak = chosen.evidence_nats < kWeakNats;
-  if (rival > (is_weak ? kWeakRunnerUpRatio : kMaxRunnerUpRatio)) {
-    choice.status = RefineStatus::kAmbiguous;
-  }
+  if (rival > MaxRunnerUpRatio(chosen.evidence_nats)) choice.status = RefineStatus::kAmbiguous;
   return choice;
 }
 

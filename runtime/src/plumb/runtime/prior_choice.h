@@ -33,7 +33,7 @@ struct PriorChoice {
 
 /// The refined pose with the most evidence; one that only points decide when there is none that
 /// lines do. It is kAmbiguous when a clearly different pose of another prior has about as much
-/// evidence (kMaxRunnerUpRatio, kWeakRunnerUpRatio), whatever became of that one, or is held by
+/// evidence (MaxRunnerUpRatio), whatever became of that one, or is held by
 /// points. Where nothing was refined, the prior with the most evidence says why. Ties go to the
 /// first prior.
 /// @param outcomes  One a prior, at least one.

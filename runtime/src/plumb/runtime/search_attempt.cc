@@ -114,7 +114,7 @@ void SearchMethod::Judge(const RefineInput& input, const PosePrior& prior, const
   attempt->status = Decide(attempt->evidence,
                            {.min_map_support = options_.min_map_support,
                             .min_evidence_nats = EvidenceNeeded(found.cam_from_world, best.nats),
-                            .max_runner_up_ratio = best.MaxRunnerUpRatio(),
+                            .max_runner_up_ratio = MaxRunnerUpRatio(best.fused_nats),
                             .min_gain = input.search ? kSearchGain : kStreamGain,
                             .needs_all_directions = input.search});
 }

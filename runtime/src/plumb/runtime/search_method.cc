@@ -39,6 +39,12 @@ constexpr double kRivalFactor = 3.0;
 
 constexpr double kMinScale = 0.02;  // of residuals: perfect input must not divide by zero
 
+PosePrior Widened(PosePrior prior, double factor) {
+  prior.position_sigma_m *= factor;
+  prior.rotation_sigma_rad *= factor;
+  return prior;
+}
+
 Matrix6d PriorInformation(const PosePrior& prior) { return CovarianceOf(prior).inverse(); }
 
 }  // namespace
@@ -160,10 +166,7 @@ void SearchMethod::WidenTrials() {
   if (HasAnySucceeded()) return;
   size_t num_left = 0;
   const auto widened = [](const Trial& trial) {
-    PosePrior wide = trial.input.prior;
-    wide.position_sigma_m *= kWideningFactor;
-    wide.rotation_sigma_rad *= kWideningFactor;
-    return wide;
+    return Widened(trial.input.prior, kWideningFactor);
   };
   const auto num_hypotheses = [this](const Trial& trial) {
     return std::min(kMaxHypotheses, 2 * NumHypotheses(trial.input.prior));
@@ -180,12 +183,9 @@ void SearchMethod::WidenTrials() {
     try_deadline_ = num_left == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_left));
     --num_left;
     const Attempt second = Try(trial, {.prior = wide, .num_hypotheses = num_hypotheses(trial)});
-    if (second.status != RefineStatus::kRefined) {
-      if (second.best.nats > trial.attempt.best.nats) trial.attempt = second;
-      continue;
-    }
-    trial.attempt = second;
-    trial.prior = wide;
+    const bool is_refined = second.status == RefineStatus::kRefined;
+    if (is_refined) trial.prior = wide;
+    if (is_refined || second.best.nats > trial.attempt.best.nats) trial.attempt = second;
   }
 }
 
@@ -301,9 +301,7 @@ bool SearchMethod::HoldsByPoints(const RefineInput& input, const PointPose& poin
 }
 
 void SearchMethod::LookFarther(Trial* trial) {
-  PosePrior wide = trial->prior;
-  wide.position_sigma_m *= kRivalFactor;
-  wide.rotation_sigma_rad *= kRivalFactor;
+  const PosePrior wide = Widened(trial->prior, kRivalFactor);
   try_deadline_ = deadline_;
   num_tried_ += CountDistinctPoses(wide, kMaxHypotheses);
   const Attempt second = Try(*trial, {.prior = wide, .num_hypotheses = kMaxHypotheses});
@@ -317,7 +315,7 @@ void SearchMethod::LookFarther(Trial* trial) {
   // On the lines that the wide prior sees, as the supports of the survivors.
   attempt.best.support = MeasureSupport(trial->input.camera, attempt.best.alignment.cam_from_world);
   FindRunnerUp(&attempt);
-  if (attempt.evidence.runner_up_ratio > attempt.best.MaxRunnerUpRatio()) {
+  if (attempt.evidence.runner_up_ratio > MaxRunnerUpRatio(attempt.best.fused_nats)) {
     attempt.status = RefineStatus::kAmbiguous;
   }
 }

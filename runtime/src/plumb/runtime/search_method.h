@@ -54,7 +54,6 @@ class SearchMethod {
     bool is_by_key_frames = false;  // the latter
 
     bool IsWeak() const { return fused_nats < kWeakNats; }
-    double MaxRunnerUpRatio() const { return IsWeak() ? kWeakRunnerUpRatio : kMaxRunnerUpRatio; }
   };
   /// One try to find the pose within an uncertainty.
   struct Attempt {

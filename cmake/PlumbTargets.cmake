@@ -5,8 +5,6 @@ target_compile_options(plumb_flags INTERFACE
   # GCC 12 finds overlaps in string concatenation that are not there (GCC bug 105651).
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>
   $<$<CXX_COMPILER_ID:GNU,Clang>:-Wall -Wextra -Wpedantic -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wconversion -Wno-sign-conversion>>
-  # False positives of GCC 12 on literal + std::string (GCC bug 105651).
-  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>
   $<$<BOOL:${PLUMB_WERROR}>:-Werror>)
 if(PLUMB_SANITIZE)  # Directory-wide: every object in a process must agree on it.
   add_compile_options(-fsanitize=${PLUMB_SANITIZE} -fno-omit-frame-pointer)

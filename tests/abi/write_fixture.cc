@@ -2,7 +2,7 @@
 //
 // usage: write_fixture DIR    makes DIR/map, DIR/<i>.pgm and DIR/poses.txt with a line a frame:
 //        fx fy cx cy, prior (q_xyzw t), truth (q_xyzw t); DIR/radtan.pgm and DIR/fisheye.pgm are
-//        frame 0 through the lenses of abi_test.c
+//        frame 0 through the lenses of frame_test.c
 #include <cstdio>
 #include <filesystem>
 #include <fstream>

@@ -44,6 +44,8 @@ static void test_broken_frames(const fixture* f, const plumb_map* map) {
   EXPECT_REFUSED(frame.struct_size = 4, "struct_size 4");
   EXPECT_REFUSED(frame.struct_size = 0, "struct_size 0");
   EXPECT_REFUSED(frame.struct_size = 0xffffffffu, "struct_size");
+  EXPECT_REFUSED(frame.struct_size = sizeof frame - 1, "struct_size");
+  EXPECT_REFUSED(frame.prior_position_sigma_m = 2000.0, "position_sigma_m 2000");
   EXPECT_REFUSED(frame.format = 0, "format 0");
   EXPECT_REFUSED(frame.format = 99, "format 99");
   EXPECT_REFUSED(frame.width_px = 0, "width_px");

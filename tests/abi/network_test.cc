@@ -267,6 +267,12 @@ TEST_F(NetworkTest, IncompleteHostIsRefused) {
   handles.struct_size = 3;
   ExpectRefused(PLUMB_ERROR_INVALID_ARGUMENT, "struct_size 3");
   handles = host.Handles();
+  handles.queue_family = 99;
+  ExpectRefused(PLUMB_ERROR_INVALID_ARGUMENT, "queue_family 99");
+  handles = host.Handles();
+  handles.enabled_features |= 1u << 30;
+  ExpectRefused(PLUMB_ERROR_UNSUPPORTED, "enabled_features");
+  handles = host.Handles();
   options_.device = "cpu";
   ExpectRefused(PLUMB_ERROR_INVALID_ARGUMENT, "exclude each other");
 }

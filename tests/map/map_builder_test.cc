@@ -274,7 +274,9 @@ TEST(MapBuilder, MovedPosesTakeAllThatTheirFramesHoldAlong) {
     frame.points.resize(1);
     frame.points[0].point_in_world = {0.1f, 0.2f, 3.0f};
   }
-  MapBuilder builder;
+  MapBuilderOptions options;
+  options.depth_source = DepthSource::kSensor;  // triangulation iterates: equal to 2e-6 only
+  MapBuilder builder(options);
   for (const KeyFrameInput& frame : recording.frames) {
     ASSERT_TRUE(builder.AddKeyFrame(frame).has_value());
   }
@@ -461,6 +463,28 @@ TEST(MapBuilderWithBoth, TooFewViewsLeaveTheSensorsDepth) {
   for (size_t i = 0; i < both.lines.size(); ++i) {
     EXPECT_EQ(both.lines[i].segment_in_world.start, sensor.lines[i].segment_in_world.start);
   }
+}
+
+TEST(MapBuilderWithBoth, WithoutDepthTheViewsLift) {
+  Recording recording = Record(DrawnRoom(), Path(12), 0.2);
+  for (size_t k = 0; k < recording.frames.size(); ++k) {
+    DepthImage& depth = recording.depth[k];
+    for (int y = 0; y < depth.height_px; ++y) {
+      for (int x = 0; x < depth.width_px; ++x) depth.at(x, y) = 0.0f;  // nothing measured
+    }
+    recording.frames[k].depth = depth.View();
+  }
+  MapBuilderOptions options;
+  options.depth_source = DepthSource::kViews;
+  const LineMap views = BuildMap(recording, options);
+  options.depth_source = DepthSource::kBoth;
+  const LineMap both = BuildMap(recording, options);
+  ASSERT_GT(views.lines.size(), 20u);
+  for (size_t k = 0; k < views.key_frames.size(); ++k) {
+    EXPECT_EQ(both.key_frames[k].segments.size(), views.key_frames[k].segments.size());
+  }
+  EXPECT_LT(MedianError(both, DrawnRoom()), 0.03);
+  EXPECT_GT(both.lines.size(), 20u);
 }
 
 TEST(MapBuilder, KeepsWhatTheCallerAttaches) {

@@ -301,6 +301,8 @@ TEST_F(MapFileTest, RefusesHostileManifests) {
       {"a depth of another kind", "\"views\"", "\"sonar\""},
       {"a depth that is a number", "\"views\"", "7"},
       {"a detector that is a number", "\"lsd\"", "7"},
+      {"a detector that is a path", "\"lsd\"", "\"/tmp/weights.safetensors\""},
+      {"a detector of two lines", "\"lsd\"", "\"a\\nb\""},
       {"a detector that is not UTF-8", "\"lsd\"", "\"\xff\xfe\""},
       {"a huge detector", "\"lsd\"", "\"" + std::string(5000, 'x') + "\""},
       {"an origin that is text", "\"origin\": [", "\"origin\": [\"0\", "},

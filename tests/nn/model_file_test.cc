@@ -46,6 +46,16 @@ TEST(ModelFile, ReadsBackWhatWasWritten) {
     EXPECT_EQ(read->tensors.at(name).data, tensor.data);
 }
 
+TEST(ModelFile, APresetIsAPlainName) {
+  const Model model = RandomModel(SmallSpec(), 1);
+  for (const std::string& name : {std::string("../nano"), std::string("na no"),
+                                  std::string(64, 'x')}) {
+    Metadata metadata = MetadataOf(model.spec);
+    metadata["preset"] = name;
+    EXPECT_THAT(ErrorOf(ModelBytes(model, metadata)), HasSubstr("preset"));
+  }
+}
+
 TEST(ModelFile, ReadsHowDuplicatesAreRanked) {
   const Model model = RandomModel(SmallSpec(), 1);
   Metadata metadata = MetadataOf(model.spec);

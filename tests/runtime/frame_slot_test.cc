@@ -111,23 +111,26 @@ TEST(ValidateFrame, NamesWhatIsBroken) {
   ExpectRefused(frame, "camera is for 8 x 2 px");
   frame = host.frame;
   frame.prior.cam_from_world.translation.x() = kNan;
-  ExpectRefused(frame, "prior.cam_from_world is not finite");
+  ExpectRefused(frame, "prior: translation (nan, 0, 0) is not finite");
   frame = host.frame;
   frame.prior.cam_from_world.rotation.coeffs() *= 1.01;
-  ExpectRefused(frame, "norm 1.01");
+  ExpectRefused(frame, "not a finite unit quaternion");
   frame = host.frame;
   frame.prior.position_sigma_m = 0.0;
   ExpectRefused(frame, "prior.position_sigma_m");
   frame = host.frame;
   frame.prior.rotation_sigma_rad = kNan;
   ExpectRefused(frame, "prior.rotation_sigma_rad");
+  frame = host.frame;
+  frame.prior.position_sigma_m = 2000.0;
+  ExpectRefused(frame, "prior.position_sigma_m 2000 is not in [1e-9, 1000]");
   std::vector<PosePrior> more(2);
   frame = host.frame;
   frame.more_priors = more;
   more[1].rotation_sigma_rad = -0.25;
   ExpectRefused(frame, "more_priors[1].rotation_sigma_rad -0.25");
   more[0].cam_from_world.translation.z() = kNan;
-  ExpectRefused(frame, "more_priors[0].cam_from_world is not finite");
+  ExpectRefused(frame, "more_priors[0]: translation (0, 0, nan)");
   more.assign(kMaxMorePriors + 1, PosePrior{});
   frame.more_priors = more;
   ExpectRefused(frame, "more_priors has 9 entries, more than 8");
@@ -136,6 +139,8 @@ TEST(ValidateFrame, NamesWhatIsBroken) {
   frame = host.frame;
   frame.points = points;
   ExpectRefused(frame, "points[1]");
+  points[1].pixel.x() = 2e6;
+  ExpectRefused(frame, "points[1] at (2e+06, 0) is not in pixels of an image");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "plumb/geometry/line_projection.h"
+#include "plumb/map/depth_view.h"
 #include "plumb/runtime/fine_alignment.h"
 #include "plumb/runtime/point_solver.h"
 #include "support/synthetic_room.h"
@@ -74,9 +75,20 @@ TEST(LineSelector, LocalLinesCarryTheUncertaintyOfTheirDepth) {
     const Eigen::Vector3d variances =
         line.covariance_start.selfadjointView<Eigen::Lower>().eigenvalues();
     EXPECT_GT(variances[0], 0.0);
-    // Along the ray at least 3 mm.
-    EXPECT_GT(variances[2], 0.003 * 0.003);
     EXPECT_LT(variances[2], 0.2 * 0.2);
+    // Seen by one of the key frames, the deviation of the end's depth is the depth sensor's,
+    // wherever in the image it lies.
+    bool is_of_a_key_frame = false;
+    for (const KeyFrame& frame : room.map.key_frames) {
+      const Eigen::Vector3d ray =
+          line.segment_in_world.start - frame.cam_from_world.Inverse().translation;
+      const Eigen::Vector3d axis = frame.cam_from_world.RotationMatrix().row(2);
+      const double depth = axis.dot(ray), sigma = DepthNoise{}.SigmaAt(depth);
+      const double along = ray.dot(line.covariance_start * ray) / ray.squaredNorm();
+      is_of_a_key_frame |=
+          std::abs(std::sqrt(along) * depth / ray.norm() - sigma) < 1e-9 + 1e-6 * sigma;
+    }
+    EXPECT_TRUE(is_of_a_key_frame);
   }
 }
 

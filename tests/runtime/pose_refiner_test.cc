@@ -363,16 +363,16 @@ TEST(PoseRefinerInput, BadPriorsAreNamed) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   RefineInput input = InputOf({}, QueryPose(0));
   input.prior.cam_from_world.translation.y() = nan;
-  EXPECT_THAT(ErrorOf(input), HasSubstr("prior translation"));
+  EXPECT_THAT(ErrorOf(input), HasSubstr("prior: translation"));
   EXPECT_THAT(ErrorOf(input), HasSubstr("nan"));
   input = InputOf({}, QueryPose(0));
   input.prior.cam_from_world.rotation.w() = nan;
-  EXPECT_THAT(ErrorOf(input), HasSubstr("prior rotation"));
+  EXPECT_THAT(ErrorOf(input), HasSubstr("prior: rotation"));
   input = InputOf({}, QueryPose(0));
   input.prior.cam_from_world.rotation.coeffs() *= 2.0;
   EXPECT_THAT(ErrorOf(input), HasSubstr("unit quaternion"));
   input = InputOf({}, QueryPose(0), 0.0);
-  EXPECT_THAT(ErrorOf(input), HasSubstr("prior position uncertainty"));
+  EXPECT_THAT(ErrorOf(input), HasSubstr("prior.position_sigma_m 0 "));
   input = InputOf({}, QueryPose(0), 0.1, -0.5);
   EXPECT_THAT(ErrorOf(input), HasSubstr("-0.5"));
 }
@@ -388,7 +388,7 @@ TEST(PoseRefinerInput, BadCamerasSegmentsAndPointsAreNamed) {
   points[2].point_in_world.x() = std::numeric_limits<double>::quiet_NaN();
   input = InputOf({}, QueryPose(0));
   input.points = points;
-  EXPECT_THAT(ErrorOf(input), HasSubstr("point 2"));
+  EXPECT_THAT(ErrorOf(input), HasSubstr("points[2]"));
 }
 
 TEST(PoseRefinerInput, SegmentsWithoutLengthAreHarmless) {
@@ -419,6 +419,7 @@ TEST(PoseRefinerBudget, OneThatIsSpentAtOnceLeavesTheGateInPlace) {
     const Rigid3 prior = Disturb(QueryPose(k), 0.10, 2.0 * kDegree, &random);
     const RefineResult result = scene.Refine(InputOf(segments, prior));
     EXPECT_TRUE(result.stages.out_of_time);
+    EXPECT_LE(result.stages.num_hypotheses, 96u);
     // What is left is a search all the same: the pose is better, or the prior to the last bit.
     const double before = DistanceBetween(prior, QueryPose(k)).position_m;
     const double after = DistanceBetween(result.cam_from_world, QueryPose(k)).position_m;
@@ -428,6 +429,50 @@ TEST(PoseRefinerBudget, OneThatIsSpentAtOnceLeavesTheGateInPlace) {
     } else {
       EXPECT_TRUE(HaveSameBits(result.cam_from_world, prior));
     }
+  }
+}
+
+TEST(PoseRefinerBudget, AWeakPoseWithoutTimeForItsRivalsIsAmbiguous) {
+  // Posts all alike, of which most are missing: what little is found fits at several places.
+  const std::vector<Segment3> lines = testing::FenceLines(0.5);
+  std::vector<Rigid3> key_frames;
+  for (int k = 0; k < 9; ++k) key_frames.push_back(LookAlong({0, -2.0 + 0.5 * k, 0}, {1, 0, 0}));
+  Scene free(lines, {}, key_frames), bounded(lines, {.time_budget_ns = 1}, key_frames);
+  Random random(9);
+  int weak = 0;
+  for (int k = 0; k < 40; ++k) {
+    const Rigid3 truth = LookAlong({0.1, 0.02 * k - 0.4, 0.05}, {1, 0.05, 0});
+    const auto segments = Render(lines, truth, 50 + k, {.missing_share = 0.6, .num_clutter = 60});
+    Rigid3 prior = Disturb(truth, 0.1, 2.0 * kDegree, &random);
+    prior.translation.x() += k % 2 == 0 ? -0.45 : 0.45;
+    const RefineInput input = InputOf(segments, prior, 0.25, 3.0 * kDegree);
+    const RefineResult result = bounded.Refine(input);
+    if (result.status == RefineStatus::kRefined) {
+      EXPECT_GE(result.evidence_nats, 15.0) << "query " << k;
+    } else {
+      EXPECT_TRUE(HaveSameBits(result.cam_from_world, prior)) << "query " << k;
+    }
+    weak += result.status == RefineStatus::kAmbiguous && result.evidence_nats > 0.0;
+  }
+  EXPECT_GE(weak, 5);
+}
+
+TEST(PoseRefiner, ATiltThatGravityRightsIsReturned) {
+  Scene scene(testing::RoomLines());
+  for (int k = 0; k < 8; ++k) {
+    const Rigid3 truth = QueryPose(k);
+    const auto segments = Render(scene.lines, truth, 600 + k, {.noise_px = 0.3});
+    // Only the tilt is off: with gravity the prior is as good as what the lines say.
+    const Eigen::Quaterniond tilted =
+        (ExpSo3(Eigen::Vector3d(2.0 * kDegree, 0.0, 0.0)) * truth.rotation).normalized();
+    RefineInput input =
+        InputOf(segments, {tilted, -(tilted * truth.Center())}, 0.05, 2.0 * kDegree);
+    input.prior.gravity =
+        GravityPrior{truth.rotation * -Eigen::Vector3d::UnitZ(), -Eigen::Vector3d::UnitZ(), 1e-5};
+    const RefineResult result = scene.Refine(input);
+    EXPECT_EQ(ToString(result.status), "REFINED") << "query " << k;
+    EXPECT_LT(DistanceBetween(result.cam_from_world, truth).rotation_rad, 0.3 * kDegree)
+        << "query " << k;
   }
 }
 
@@ -442,6 +487,11 @@ TEST(PoseRefinerOptions, OutOfRangeValuesAreRefused) {
               HasSubstr("min_map_support"));
   EXPECT_THAT(PoseRefiner::Create(index, {.time_budget_ns = -5}).error().message,
               HasSubstr("time_budget_ns -5"));
+  EXPECT_THAT(
+      PoseRefiner::Create(index, {.method = RefineMethod::kPaper, .time_budget_ns = 1'000'000})
+          .error()
+          .message,
+      HasSubstr("time_budget_ns 1000000"));
 }
 
 }  // namespace

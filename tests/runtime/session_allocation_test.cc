@@ -77,5 +77,36 @@ TEST(SessionAllocations, IndependentFramesAllocateForTheDetectorOnly) {
   ExpectOneAllocationAFrame(SessionMode::kIndependent);
 }
 
+TEST(SessionAllocations, WithoutMemoryAFrameFailsAndTheNextOneWorks) {
+  const WallScene scene;
+  const LineMap map = scene.MakeMap(WallScene::KeyFramePoses());
+  const MapIndex index(map);
+  const Rigid3 truth{ExpSo3({0.01, 0.2, -0.01}), Eigen::Vector3d(0.03, 0.0, -0.02)};
+  const auto image = scene.Render(truth);
+  Result<std::unique_ptr<Session>> session = Session::Create(index, CreateLsdDetector(), {});
+  ASSERT_TRUE(session);
+  SessionFrame frame;
+  frame.image = image.View();
+  frame.camera = scene.camera;
+  frame.prior.cam_from_world = truth;
+  testing::has_memory = true;
+  for (const bool memory_is_out : {true, true, false}) {
+    testing::memory_is_out = memory_is_out;
+    ++frame.timestamp_ns;
+    const Result<SubmitOutcome> submitted = (*session)->Submit(frame);
+    FrameResult result;
+    const bool has_result = (*session)->Wait(60'000'000'000, &result);
+    testing::memory_is_out = false;
+    ASSERT_TRUE(submitted);
+    ASSERT_TRUE(has_result);
+    if (memory_is_out) {
+      EXPECT_EQ(result.outcome, FrameOutcome::kFailed);
+      EXPECT_EQ(result.error.code, ErrorCode::kOutOfMemory) << result.error.message;
+    } else {
+      EXPECT_EQ(result.outcome, FrameOutcome::kProcessed) << result.error.message;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace plumb

@@ -276,6 +276,34 @@ TEST_F(SessionTest, NewestFrameReplacesTheWaitingOneWhichIsReportedInOrder) {
   EXPECT_EQ(session_->Stats().dropped, 2u);
 }
 
+TEST_F(SessionTest, ReleaseOfAReplacedFrameMaySubmitTheNextOne) {
+  control_->Allow(0);
+  Start({});
+  EXPECT_EQ(Submit(0), SubmitOutcome::kAccepted);
+  control_->AwaitSubmitted(1);
+  struct Host {
+    Session* session;
+    int num_submitted;
+  } host{session_.get(), 1};
+  struct Release {
+    static void Call(void* user) {
+      Host* to = static_cast<Host*>(user);
+      if (to->num_submitted >= 8) return;
+      SessionFrame frame = TheRoom().Frame(to->num_submitted++, PriorError());
+      frame.release = &Release::Call;
+      frame.release_user = to;
+      EXPECT_TRUE(to->session->Submit(frame));
+    }
+  };
+  Release::Call(&host);
+  Release::Call(&host);  // replaces the one before, whose release submits, and so on
+  EXPECT_EQ(host.num_submitted, 8);
+  EXPECT_EQ(session_->Stats().submitted, 8u);
+  control_->Allow(1 << 30);
+  for (uint64_t i = 0; i < 8; ++i) EXPECT_EQ(Next().frame_index, i);
+  session_.reset();
+}
+
 TEST_F(SessionTest, BlockingSubmitTimesOut) {
   control_->Allow(0);
   SessionOptions options = Blocking();

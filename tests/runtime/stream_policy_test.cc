@@ -31,7 +31,7 @@ void ExpectSamePose(const Rigid3& a, const Rigid3& b) {
 TEST(StreamPolicy, FirstFrameHasNoPredictionAndIsSearchedFromItsOwnPrior) {
   const StreamState state;
   const PosePrior tracker{Pose(0.2, {1, 2, 3}), 0.2, 0.05};
-  EXPECT_FALSE(PredictLocally(state, {}, tracker.cam_from_world).has_value());
+  EXPECT_FALSE(PredictLocally(state, {}, tracker).has_value());
   const PosePrior search = SearchPrior(state, tracker);
   ExpectSamePose(search.cam_from_world, tracker.cam_from_world);
   EXPECT_EQ(search.position_sigma_m, 0.2);
@@ -43,7 +43,7 @@ TEST(StreamPolicy, PredictionCarriesTheCorrectionAlong) {
   const Rigid3 truth0 = Pose(0.4, {0.1, 0.2, 1.0}), truth1 = Pose(0.7, {0.3, -0.1, 1.2});
   StreamState state;
   Advance({}, truth0 * world_error, truth0, ResultOf(RefineStatus::kRefined, truth0, 0.5), &state);
-  const auto prior = PredictLocally(state, {}, truth1 * world_error);
+  const auto prior = PredictLocally(state, {}, {truth1 * world_error});
   ASSERT_TRUE(prior.has_value());
   ExpectSamePose(prior->cam_from_world, truth1);
 }
@@ -66,6 +66,17 @@ TEST(StreamPolicy, UncertaintyGrowsWithTheRootOfTheFramesSinceTheLastSuccess) {
   EXPECT_DOUBLE_EQ(PredictLocally(state, {}, {})->position_sigma_m, 0.02 * 2.0);
   Advance({}, {}, {}, ResultOf(RefineStatus::kRefined, {}, 0.4), &state);
   EXPECT_DOUBLE_EQ(PredictLocally(state, {}, {})->position_sigma_m, 0.02);
+}
+
+TEST(StreamPolicy, UncertaintyGrowsNoFartherThanTheTrackersOwn) {
+  StreamState state;
+  Advance({}, {}, {}, ResultOf(RefineStatus::kRefined, {}, 0.5), &state);
+  state.frames_without_success = 1'000'000;
+  const auto prior = PredictLocally(state, {}, {{}, 0.3, 0.1});
+  EXPECT_EQ(prior->position_sigma_m, 0.3);
+  EXPECT_EQ(prior->rotation_sigma_rad, 0.1);
+  // A tracker that knows better than the stream's options does not make them smaller.
+  EXPECT_EQ(PredictLocally(state, {}, {{}, 0.001, 0.0001})->position_sigma_m, 0.02);
 }
 
 TEST(StreamPolicy, KeptPriorIsASuccessAndOthersAreNot) {
@@ -135,9 +146,9 @@ TEST(StreamPolicy, FailureKeepsTheCorrection) {
   const Rigid3 refined = Pose(0.2, {0, 0, 1}), tracker0 = Pose(0.1, {0, 0.1, 1});
   StreamState state;
   Advance({}, tracker0, refined, ResultOf(RefineStatus::kRefined, refined, 0.5), &state);
-  const Rigid3 predicted = PredictLocally(state, {}, tracker0)->cam_from_world;
+  const Rigid3 predicted = PredictLocally(state, {}, {tracker0})->cam_from_world;
   Advance({}, tracker0, predicted, ResultOf(RefineStatus::kLowSupport, tracker0, 0.0), &state);
-  ExpectSamePose(PredictLocally(state, {}, tracker0)->cam_from_world, refined);
+  ExpectSamePose(PredictLocally(state, {}, {tracker0})->cam_from_world, refined);
 }
 
 TEST(StreamOptions, ValidateNamesTheMemberOutOfRange) {
@@ -150,6 +161,9 @@ TEST(StreamOptions, ValidateNamesTheMemberOutOfRange) {
   options.rotation_sigma_rad = std::numeric_limits<double>::quiet_NaN();
   ASSERT_FALSE(options.Validate());
   EXPECT_NE(options.Validate().error().message.find("rotation_sigma_rad"), std::string::npos);
+  options = {};
+  options.rotation_sigma_rad = 3.3;
+  EXPECT_FALSE(options.Validate());
   options = {};
   options.lost_support_share = 1.0;
   EXPECT_FALSE(options.Validate());

@@ -128,7 +128,7 @@ TEST_F(StreamTrackerTest, AskMorePriorsWhenTheStreamIsLost) {
   RefineInput first = Input(0, Perturb(TruePose(0), lost));
   ASSERT_TRUE(tracker_->Track(first, &result_));
   EXPECT_NE(result_.status, RefineStatus::kRefined) << "without them";
-  tracker_->Reset();
+  tracker_.emplace(refiner_.get());
   first.more_priors = hits;
   ASSERT_TRUE(tracker_->Track(first, &result_));
   EXPECT_EQ(ToString(result_.status), "REFINED");
@@ -169,13 +169,33 @@ TEST_F(StreamTrackerTest, ErrorLeavesTheStreamAsItWas) {
   EXPECT_LT(Track(2, TruePose(2)), 0.01);
 }
 
-TEST_F(StreamTrackerTest, ResetForgetsTheStream) {
-  Track(0, TruePose(0));
-  Track(1, TruePose(1));
-  EXPECT_FALSE(tracker_->searched());
-  tracker_->Reset();
-  Track(2, TruePose(2));
-  EXPECT_TRUE(tracker_->searched());
+TEST_F(StreamTrackerTest, HoursOfDarknessEnd) {
+  // A prediction that grows without an end would be no valid prior after 2,000 frames.
+  tracker_.emplace(refiner_.get(), StreamOptions{.rotation_sigma_rad = 0.07});
+  EXPECT_LT(Track(0, TruePose(0)), 0.01);
+  RefineInput dark = Input(1, TruePose(1));
+  dark.segments = {};
+  for (int i = 0; i < 3000; ++i) ASSERT_TRUE(tracker_->Track(dark, &result_)) << "frame " << i;
+  EXPECT_LT(Track(2, TruePose(2)), 0.01);
+  EXPECT_EQ(ToString(result_.status), "REFINED");
+}
+
+TEST_F(StreamTrackerTest, ATimeBudgetIsTheFramesNotEachAttempts) {
+  Vector6d lost;
+  lost << 0.2, -0.25, 0.1, 0.4, 0.3, -0.3;
+  const auto hypotheses_of_a_lost_frame = [&](int64_t time_budget_ns) {
+    Result<std::unique_ptr<PoseRefiner>> refiner =
+        PoseRefiner::Create(index_, {.time_budget_ns = time_budget_ns});
+    StreamTracker tracker(refiner->get());
+    EXPECT_TRUE(tracker.Track(Input(0, TruePose(0)), &result_));
+    EXPECT_TRUE(tracker.Track(Input(1, Perturb(TruePose(1), lost)), &result_));
+    EXPECT_TRUE(tracker.searched());
+    EXPECT_EQ(result_.stages.out_of_time, time_budget_ns > 0);
+    EXPECT_GE(result_.total_ns, result_.search_ns + result_.match_and_refine_ns);
+    return result_.stages.num_hypotheses;
+  };
+  EXPECT_GE(hypotheses_of_a_lost_frame(0), 1000u) << "two searches";
+  EXPECT_LE(hypotheses_of_a_lost_frame(1), 96u) << "the least of one";
 }
 
 }  // namespace

@@ -9,9 +9,13 @@
 namespace plumb::testing {
 
 inline std::atomic<size_t> num_allocations{0};
+/// Set: allocations of threads that have not claimed memory fail.
+inline std::atomic<bool> memory_is_out{false};
+inline thread_local bool has_memory = false;
 
 inline void* CountedAllocation(std::size_t size, std::size_t alignment) {
   num_allocations.fetch_add(1, std::memory_order_relaxed);
+  if (memory_is_out && !has_memory) throw std::bad_alloc();
   void* memory =
       alignment <= alignof(std::max_align_t)
           ? std::malloc(size == 0 ? 1 : size)

@@ -39,6 +39,11 @@ std::vector<std::string> ModelFolders() {
   return folders;
 }
 
+constexpr uint32_t kKnownFeatures =
+    PLUMB_VULKAN_BUFFER_DEVICE_ADDRESS | PLUMB_VULKAN_SHADER_INT64 | PLUMB_VULKAN_SHADER_FLOAT64 |
+    PLUMB_VULKAN_SHADER_FLOAT16 | PLUMB_VULKAN_STORAGE_16BIT | PLUMB_VULKAN_STORAGE_8BIT |
+    PLUMB_VULKAN_SCALAR_BLOCK_LAYOUT;
+
 Result<std::shared_ptr<gpu::Device>> AdoptDevice(const plumb_vulkan_host& from) {
   constexpr size_t kSizeV1 = offsetof(plumb_vulkan_host, reserved) + sizeof from.reserved;
   Result<plumb_vulkan_host> host = ReadStruct(&from, kSizeV1, "plumb_vulkan_host");
@@ -49,6 +54,11 @@ Result<std::shared_ptr<gpu::Device>> AdoptDevice(const plumb_vulkan_host& from) 
   if ((host->lock_queue == nullptr) != (host->unlock_queue == nullptr)) {
     return Error{ErrorCode::kInvalidArgument,
                  "plumb_vulkan_host.lock_queue and unlock_queue need each other"};
+  }
+  if ((host->enabled_features & ~kKnownFeatures) != 0) {
+    return Error{ErrorCode::kUnsupported, "plumb_vulkan_host.enabled_features " +
+                                              std::to_string(host->enabled_features) +
+                                              " has bits that this version does not know"};
   }
   const auto has = [&](uint32_t bit) { return (host->enabled_features & bit) != 0; };
   gpu::HostDevice device;

@@ -36,6 +36,8 @@ plumb_result ToAbi(ErrorCode code) {
       return PLUMB_ERROR_IO;
     case ErrorCode::kDeviceLost:
       return PLUMB_ERROR_DEVICE_LOST;
+    case ErrorCode::kOutOfMemory:
+      return PLUMB_ERROR_OUT_OF_MEMORY;
     case ErrorCode::kInternal:
       return PLUMB_ERROR_INTERNAL;
   }

@@ -15,6 +15,9 @@ namespace plumb::abi {
 /// Larger than any struct ever gets: an uninitialised size is caught before it is believed.
 inline constexpr uint32_t kMaxStructBytes = 1u << 16;
 
+/// Every member's size is a multiple of it: another size ends inside of one.
+inline constexpr uint32_t kMemberBytes = 4;
+
 /// A struct of this library's version with what the caller set; members that an older caller does
 /// not know are zero. `size_v1` is the size of the struct's first version.
 /// @return kInvalidArgument when the struct is null or its size impossible; kUnsupported when a
@@ -25,7 +28,7 @@ Result<T> ReadStruct(const T* from, size_t size_v1, const char* name) {
     return Error{ErrorCode::kInvalidArgument, std::string(name) + " must not be NULL"};
   }
   const uint32_t size = from->struct_size;
-  if (size < size_v1 || size > kMaxStructBytes) {
+  if (size < size_v1 || size > kMaxStructBytes || size % kMemberBytes != 0) {
     return Error{ErrorCode::kInvalidArgument, std::string(name) + ".struct_size " +
                                                   std::to_string(size) + " is not the size of " +
                                                   name + " (" + std::to_string(sizeof(T)) + ")"};

@@ -34,7 +34,9 @@ class LsdDetector : public LineDetector {
       try {
         Detect(Luminance(image, &gray_));
       } catch (const cv::Exception& e) {
-        return Error{ErrorCode::kInternal, "LsdDetector: OpenCV failed: " + e.msg};
+        return Error{
+            e.code == cv::Error::StsNoMem ? ErrorCode::kOutOfMemory : ErrorCode::kInternal,
+            "LsdDetector: OpenCV failed: " + e.msg};
       }
     }
     in_flight_ = true;

@@ -68,6 +68,19 @@ std::string VersionText(uint32_t version) {
   return text;
 }
 
+std::vector<VkQueueFamilyProperties> QueueFamilies(const InstanceTable& table,
+                                                   VkPhysicalDevice physical_device) {
+  uint32_t count = 0;
+  table.vkGetPhysicalDeviceQueueFamilyProperties(physical_device, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  table.vkGetPhysicalDeviceQueueFamilyProperties(physical_device, &count, families.data());
+  return families;
+}
+
+bool CanCompute(const VkQueueFamilyProperties& family) {
+  return family.queueCount > 0 && (family.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0;
+}
+
 }  // namespace
 
 const char* ToString(DeviceType type) {
@@ -94,19 +107,21 @@ std::string Describe(const DeviceInfo& info) {
 }
 
 int FindComputeFamily(const InstanceTable& table, VkPhysicalDevice physical_device) {
-  uint32_t count = 0;
-  table.vkGetPhysicalDeviceQueueFamilyProperties(physical_device, &count, nullptr);
-  std::vector<VkQueueFamilyProperties> families(count);
-  table.vkGetPhysicalDeviceQueueFamilyProperties(physical_device, &count, families.data());
+  const auto families = QueueFamilies(table, physical_device);
   int best = -1;
-  for (uint32_t i = 0; i < count; ++i) {
-    const VkQueueFlags flags = families[i].queueFlags;
-    if (families[i].queueCount == 0 || (flags & VK_QUEUE_COMPUTE_BIT) == 0) continue;
+  for (size_t i = 0; i < families.size(); ++i) {
+    if (!CanCompute(families[i])) continue;
     // A family without graphics keeps clear of the host's rendering.
-    if ((flags & VK_QUEUE_GRAPHICS_BIT) == 0) return static_cast<int>(i);
+    if ((families[i].queueFlags & VK_QUEUE_GRAPHICS_BIT) == 0) return static_cast<int>(i);
     if (best < 0) best = static_cast<int>(i);
   }
   return best;
+}
+
+bool IsComputeFamily(const InstanceTable& table, VkPhysicalDevice physical_device,
+                     uint32_t family) {
+  const auto families = QueueFamilies(table, physical_device);
+  return family < families.size() && CanCompute(families[family]);
 }
 
 DeviceInfo QueryDeviceInfo(const InstanceTable& table, VkPhysicalDevice physical_device) {
@@ -151,10 +166,7 @@ DeviceInfo QueryDeviceInfo(const InstanceTable& table, VkPhysicalDevice physical
     info.unusable_because = "it has no compute queue";
     return info;
   }
-  uint32_t count = 0;
-  table.vkGetPhysicalDeviceQueueFamilyProperties(physical_device, &count, nullptr);
-  std::vector<VkQueueFamilyProperties> families(count);
-  table.vkGetPhysicalDeviceQueueFamilyProperties(physical_device, &count, families.data());
+  const auto families = QueueFamilies(table, physical_device);
   if (families[static_cast<size_t>(family)].timestampValidBits > 0) {
     info.timestamp_period_ns = static_cast<double>(core.limits.timestampPeriod);
   }

@@ -94,6 +94,7 @@ DeviceInfo QueryDeviceInfo(const InstanceTable& table, VkPhysicalDevice physical
 
 /// A family with compute, preferably without graphics; -1 if there is none.
 int FindComputeFamily(const InstanceTable& table, VkPhysicalDevice physical_device);
+bool IsComputeFamily(const InstanceTable& table, VkPhysicalDevice physical_device, uint32_t family);
 
 struct VulkanDevice {
   std::unique_ptr<Instance> instance;

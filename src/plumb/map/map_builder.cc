@@ -133,13 +133,12 @@ void MapBuilder::LiftByBoth(const MapBuildProgress& progress, std::vector<KeyFra
   }
   const DepthNoise& noise = options_.fusion.depth_noise;
   const std::optional<DepthFit> fit = FitDepthCorrection(CompareDepths(lifts), noise);
-  if (!fit) return LiftBySensor(key_frames);
-  depth_fit_ = *fit;
-  stats_.depth_change = fit->median_change;
+  if (fit) depth_fit_ = *fit;  // else too little depth to compare: as it is, beside the views
+  stats_.depth_change = depth_fit_.median_change;
   for (size_t k = 0; k < key_frames->size(); ++k) {
     KeyFrame& frame = (*key_frames)[k];
-    frame.segments = FuseLifts(lifts[k], *fit, noise, &stats_.num_averaged);
-    CorrectPoints(fit->correction, frame.cam_from_world, &frame.points);
+    frame.segments = FuseLifts(lifts[k], depth_fit_, noise, &stats_.num_averaged);
+    if (fit) CorrectPoints(fit->correction, frame.cam_from_world, &frame.points);
   }
 }
 

@@ -3,12 +3,13 @@
 #include <cmath>
 #include <string>
 
+#include "plumb/base/plain_name.h"
+
 namespace plumb {
 namespace {
 
 constexpr double kRounding = 1e-6;  // of a covariance's entries, relative to the largest
 constexpr double kUnitTolerance = 1e-3;
-constexpr size_t kMaxDetectorBytes = 1024;
 constexpr int kMaxImageSide = 65536;
 constexpr double kMaxCoordinate = 1e7;  // [m] or [px]; also keeps float32 records finite
 
@@ -124,30 +125,6 @@ Status CheckKeyFrames(const LineMap& map) {
   return Ok();
 }
 
-/// Also refuses over-long forms and surrogates, which JSON writers refuse.
-bool IsUtf8(const std::string& text) {
-  for (size_t i = 0; i < text.size();) {
-    const auto byte = [&](size_t k) { return static_cast<unsigned char>(text[k]); };
-    const unsigned char lead = byte(i);
-    const size_t length = lead < 0x80   ? 1
-                          : lead < 0xc2 ? 0
-                          : lead < 0xe0 ? 2
-                          : lead < 0xf0 ? 3
-                          : lead < 0xf5 ? 4
-                                        : 0;
-    if (length == 0 || i + length > text.size()) return false;
-    for (size_t k = 1; k < length; ++k) {
-      if ((byte(i + k) & 0xc0) != 0x80) return false;
-    }
-    if ((lead == 0xe0 && byte(i + 1) < 0xa0) || (lead == 0xed && byte(i + 1) > 0x9f) ||
-        (lead == 0xf0 && byte(i + 1) < 0x90) || (lead == 0xf4 && byte(i + 1) > 0x8f)) {
-      return false;
-    }
-    i += length;
-  }
-  return true;
-}
-
 }  // namespace
 
 Status CheckMap(const LineMap& map) {
@@ -182,9 +159,9 @@ Status CheckMap(const LineMap& map) {
                    "The correction of the camera changes its size or mirrors it"};
     }
   }
-  if (map.detector.size() > kMaxDetectorBytes || !IsUtf8(map.detector)) {
+  if (!IsPlainName(map.detector)) {
     return Error{ErrorCode::kInvalidArgument,
-                 "The detector's name is longer than 1024 bytes or not UTF-8"};
+                 "The detector's name is not up to 63 letters, digits, '_' and '-'"};
   }
   if (Status status = CheckLines(map); !status) return status;
   if (Status status = CheckSightings(map); !status) return status;

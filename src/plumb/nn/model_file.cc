@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 
+#include "plumb/base/plain_name.h"
 #include "plumb/nn/safetensors.h"
 
 namespace plumb::nn {
@@ -91,6 +92,7 @@ Result<ModelSpec> ParseSpec(const Safetensors& file) {
   Metadata metadata(file);
   ModelSpec spec;
   spec.preset = metadata.Text("preset");
+  if (!IsPlainName(spec.preset)) metadata.Fail("preset", spec.preset);
   metadata.Number("width", spec.width);
   metadata.Number("stacks", spec.stacks);
   metadata.Number("depth", spec.depth);

@@ -19,7 +19,8 @@ constexpr DirectionFieldOptions kField{.cell_px = 4, .tolerance_rad = 10.0 * kDe
 constexpr double kScoringSigmaPx = 20.0;
 // First pass: every so manieth sample; so small a share of the hypotheses enters the second where
 // kUsualAligned of them are aligned, and in proportion.
-constexpr size_t kFewStride = 8, kSecondPassDivisor = 12, kMinSecondPass = 96;
+constexpr size_t kFewStride = 8, kSecondPassDivisor = 12;
+constexpr uint32_t kMinSecondPass = 96;
 constexpr size_t kScoredAtOnce = 64;  // between two looks at the clock
 
 // The alignment: so many steps at each sigma, then the best are kept, out of kUsualAligned starts
@@ -92,13 +93,18 @@ std::span<const FoundPose> PoseSearch::Search(const SearchRegion& region,
                                               std::span<const SearchLine> lines,
                                               const PoseSearchOptions& options, uint64_t seed) {
   found_.clear();
-  times_ = {};
+  stats_ = {};
   Stopwatch watch;
   SampleLines(camera_, region.cam_from_world, lines, &samples_);
   if (samples_.count == 0 || segments_.empty()) return found_;
 
-  DrawHypotheses(region, lines, options, seed);
-  times_.draw_ns = watch.Lap();
+  uint32_t num_drawn = options.num_hypotheses;
+  if (num_drawn > kMinSecondPass && options.deadline.HasPassed(options.score_share)) {
+    num_drawn = kMinSecondPass;
+    stats_.out_of_time = true;
+  }
+  DrawHypotheses(region, lines, num_drawn, seed);
+  stats_.draw_ns = watch.Lap();
   RankAllInTwoPasses(options);
   // The prior itself always takes part.
   const size_t kept = std::min(options.num_aligned, hypotheses_.size());
@@ -111,15 +117,15 @@ std::span<const FoundPose> PoseSearch::Search(const SearchRegion& region,
   } else {
     hypotheses_.resize(kept);
   }
-  times_.score_ns = watch.Lap();
+  stats_.score_ns = watch.Lap();
   Align(region, options);
   CollectSurvivors(region, options.num_survivors);
-  times_.align_ns = watch.Lap();
+  stats_.align_ns = watch.Lap();
   return found_;
 }
 
 void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const SearchLine> lines,
-                                const PoseSearchOptions& options, uint64_t seed) {
+                                uint32_t num_hypotheses, uint64_t seed) {
   Random random(seed);
   const RotationSpread spread{
       .sigma_rad = static_cast<float>(region.rotation_sigma_rad / std::sqrt(3.0)),
@@ -134,12 +140,12 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
     h.rank = static_cast<uint32_t>(hypotheses_.size() - 1);
   };
   add(Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero());
-  const uint32_t num_drawn = (options.num_hypotheses + 1) / 2;
-  for (uint32_t k = 1; k < num_drawn; ++k) {
+  const uint32_t num_by_prior = (num_hypotheses + 1) / 2;
+  for (uint32_t k = 1; k < num_by_prior; ++k) {
     const Eigen::Matrix3f rotation = RotationFromVector(Draw(spread, &random));
     add(rotation, random.Normal3(position_sigma));
   }
-  if (options.num_hypotheses <= num_drawn) return;
+  if (num_hypotheses <= num_by_prior) return;
 
   lines_in_prior_.clear();
   for (const SearchLine& line : lines) {
@@ -150,8 +156,8 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
   clusterer_.Cluster(lines_in_prior_, kMaxClusters, &clusters_);
   rotation_search_.Search(
       camera_, std::span(segments_).first(std::min(segments_.size(), kRotationSegments)), clusters_,
-      {.num_draws = options.num_hypotheses, .spread = spread}, &random, &rotations_);
-  for (uint32_t k = num_drawn; k < options.num_hypotheses; ++k) {
+      {.num_draws = num_hypotheses, .spread = spread}, &random, &rotations_);
+  for (uint32_t k = num_by_prior; k < num_hypotheses; ++k) {
     const Eigen::Matrix3f& found =
         rotations_[random.Below(static_cast<uint32_t>(rotations_.size()))];
     const Eigen::Matrix3f rotation = RotationFromVector(random.Normal3(kRotationJitter)) * found;
@@ -161,8 +167,10 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
 
 void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
   const size_t num_second =
-      std::max(ShareOf(std::max(kMinSecondPass, hypotheses_.size() / kSecondPassDivisor), options),
+      std::max(ShareOf(std::max<size_t>(kMinSecondPass, hypotheses_.size() / kSecondPassDivisor),
+                       options),
                options.num_aligned);
+  stats_.num_scored = static_cast<uint32_t>(hypotheses_.size());
   if (num_second < hypotheses_.size()) {
     TakeEvery(samples_, kFewStride, &few_samples_);
     scorer_.Prepare(camera_, field_, kScoringSigmaPx);
@@ -176,6 +184,8 @@ void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
       }
       if (num_scored >= num_second && options.deadline.HasPassed(options.score_share)) break;
     }
+    stats_.out_of_time |= num_scored < hypotheses_.size();
+    stats_.num_scored = static_cast<uint32_t>(num_scored);
     hypotheses_.resize(num_scored);
     // The prior itself, which comes first, always takes part.
     if (num_second < hypotheses_.size()) {
@@ -203,7 +213,10 @@ void PoseSearch::Align(const SearchRegion& region, const PoseSearchOptions& opti
   hypotheses_.resize(std::min(hypotheses_.size(), options.num_wide));
   for (size_t i = 0; i < std::size(kLevels); ++i) {
     // The late ones enter in any case: better a few levels of all than all of a few.
-    if (i > kLateLevel && options.deadline.HasPassed(options.align_share)) return;
+    if (i > kLateLevel && options.deadline.HasPassed(options.align_share)) {
+      stats_.out_of_time = true;
+      return;
+    }
     const Level& level = kLevels[i];
     if (i == kLateLevel) hypotheses_.insert(hypotheses_.end(), late_.begin(), late_.end());
     const LineSamples& samples = level.all_samples ? samples_ : half_samples_;

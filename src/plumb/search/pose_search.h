@@ -36,16 +36,19 @@ struct PoseSearchOptions {
   size_t num_aligned = 32;   // best hypotheses that are aligned, beside the prior itself
   size_t num_wide = 20;      // of them, also aligned from the widest sigma on
   size_t num_survivors = 4;  // distinct poses returned at most
-  /// Shares of it after which no more hypotheses are scored, and none aligned further.
+  /// Shares of it after which no more hypotheses are scored, and none aligned further. Where the
+  /// first one has passed at the start, only as many are drawn as are scored in any case.
   Deadline deadline = {};
   double score_share = 0.35, align_share = 0.6;
 };
 
-/// Where the time of a search went [ns].
-struct PoseSearchTimes {
+/// What a search did, and where its time went [ns].
+struct PoseSearchStats {
   int64_t draw_ns = 0;   // samples, hypotheses, rotations first
   int64_t score_ns = 0;  // of all hypotheses
   int64_t align_ns = 0;
+  uint32_t num_scored = 0;   // hypotheses
+  bool out_of_time = false;  // hypotheses or levels of the alignment were left out
 };
 
 struct FoundPose {
@@ -73,7 +76,7 @@ class PoseSearch {
                                     const PoseSearchOptions& options, uint64_t seed);
 
   /// Of the last search.
-  const PoseSearchTimes& times() const { return times_; }
+  const PoseSearchStats& stats() const { return stats_; }
 
  private:
   struct Hypothesis {
@@ -83,7 +86,7 @@ class PoseSearch {
   };
 
   void DrawHypotheses(const SearchRegion& region, std::span<const SearchLine> lines,
-                      const PoseSearchOptions& options, uint64_t seed);
+                      uint32_t num_hypotheses, uint64_t seed);
   void Rank(double sigma_px, const LineSamples& samples);
   void Sort();  // best first
   /// Keeps the best by a few samples, then the best of those by all.
@@ -106,7 +109,7 @@ class PoseSearch {
   std::vector<Hypothesis> hypotheses_, late_;  // late_ are aligned from the smaller sigma on
   bool is_ranked_ = false;  // whether the last level has ranked as the survivors are
   std::vector<FoundPose> found_;
-  PoseSearchTimes times_;
+  PoseSearchStats stats_;
 };
 
 }  // namespace plumb

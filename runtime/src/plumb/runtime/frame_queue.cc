@@ -29,12 +29,11 @@ FrameSlot* FrameQueue::CommitPush(FrameSlot* slot) {
   FrameSlot* replaced = nullptr;
   {
     const std::scoped_lock lock(mutex_);
+    // May throw, so first.
+    if (waiting_ != nullptr) waiting_->dropped_before.push_back(waiting_->ticket);
     replaced = std::exchange(waiting_, slot);
     slot->dropped_before.clear();
-    if (replaced != nullptr) {
-      std::swap(slot->dropped_before, replaced->dropped_before);
-      slot->dropped_before.push_back(replaced->ticket);
-    }
+    if (replaced != nullptr) std::swap(slot->dropped_before, replaced->dropped_before);
   }
   pushed_.notify_one();
   return replaced;

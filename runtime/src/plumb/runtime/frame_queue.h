@@ -20,7 +20,7 @@ class FrameQueue {
   /// most `timeout_ns` (0: for ever). @return nullptr after the time-out or when closed.
   FrameSlot* BeginPush(int64_t timeout_ns);
 
-  /// The slot's frame waits now.
+  /// The slot's frame waits now. When memory is out, std::bad_alloc is thrown and nothing changes.
   /// @return the slot of the frame that it replaced, or nullptr. That frame is in the new one's
   ///         `dropped_before`; its slot must go to Recycle() after its image was released.
   FrameSlot* CommitPush(FrameSlot* slot);

@@ -1,7 +1,6 @@
 #include "plumb/runtime/frame_slot.h"
 
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <string>
 #include <utility>
@@ -40,27 +39,6 @@ Status Invalid(const std::string& message) {
   return Error{ErrorCode::kInvalidArgument, "SessionFrame: " + message};
 }
 
-// `name` of the prior for messages.
-Status ValidatePrior(const PosePrior& prior, const std::string& name) {
-  constexpr double kMaxQuaternionError = 1e-3;
-  const Rigid3& pose = prior.cam_from_world;
-  if (!pose.IsFinite()) return Invalid(name + ".cam_from_world is not finite");
-  if (!(std::abs(pose.rotation.norm() - 1.0) < kMaxQuaternionError)) {
-    return Invalid(name + ".cam_from_world.rotation has norm " +
-                   std::to_string(pose.rotation.norm()) + ", not 1");
-  }
-  const auto is_positive = [](double x) { return std::isfinite(x) && x > 0.0; };
-  if (!is_positive(prior.position_sigma_m)) {
-    return Invalid(name + ".position_sigma_m " + std::to_string(prior.position_sigma_m) +
-                   " is not positive");
-  }
-  if (!is_positive(prior.rotation_sigma_rad)) {
-    return Invalid(name + ".rotation_sigma_rad " + std::to_string(prior.rotation_sigma_rad) +
-                   " is not positive");
-  }
-  return prior.gravity ? CheckGravity(*prior.gravity) : Ok();
-}
-
 }  // namespace
 
 void FrameSlot::Assign(const SessionFrame& frame, const Rectifier& frame_rectifier,
@@ -78,17 +56,12 @@ void FrameSlot::Assign(const SessionFrame& frame, const Rectifier& frame_rectifi
   RectifyPoints(rectifier, &points);
   detection = Ok();
   detected.clear();
-  release = frame.release;
-  release_user = frame.release_user;
-  if (release != nullptr) {
+  release = {frame.release, frame.release_user};
+  if (release.callback != nullptr) {
     image = frame.image;
   } else {
     CopyImage(frame.image, &pixels, &image);
   }
-}
-
-void FrameSlot::ReleaseImage() {
-  if (auto* callback = std::exchange(release, nullptr)) callback(release_user);
 }
 
 Status ValidateFrame(const SessionFrame& frame) {
@@ -101,23 +74,8 @@ Status ValidateFrame(const SessionFrame& frame) {
                    std::to_string(frame.image.width_px) + " x " +
                    std::to_string(frame.image.height_px));
   }
-  if (const Status valid = ValidatePrior(frame.prior, "prior"); !valid) return valid;
-  if (frame.more_priors.size() > kMaxMorePriors) {
-    return Invalid("more_priors has " + std::to_string(frame.more_priors.size()) +
-                   " entries, more than " + std::to_string(kMaxMorePriors));
-  }
-  for (size_t i = 0; i < frame.more_priors.size(); ++i) {
-    const std::string name = "more_priors[" + std::to_string(i) + "]";
-    if (const Status valid = ValidatePrior(frame.more_priors[i], name); !valid) return valid;
-  }
-  for (size_t i = 0; i < frame.points.size(); ++i) {
-    const PointMatch& point = frame.points[i];
-    if (!point.pixel.allFinite() || !point.point_in_world.allFinite() ||
-        !point.deviation_in_world.allFinite()) {
-      return Invalid("points[" + std::to_string(i) + "] is not finite");
-    }
-  }
-  return Ok();
+  if (const Status valid = CheckPriors(frame.prior, frame.more_priors); !valid) return valid;
+  return CheckPoints(frame.points);
 }
 
 }  // namespace plumb

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "plumb/base/result.h"
@@ -24,6 +25,16 @@ struct FrameTicket {
   int64_t submitted_ns = 0;  // of the session's own clock
 };
 
+/// Gives a borrowed image back; a default one has nothing to give.
+struct ImageRelease {
+  void (*callback)(void* user) = nullptr;
+  void* user = nullptr;
+
+  void operator()() const {
+    if (callback != nullptr) callback(user);
+  }
+};
+
 /// Slots are recycled: their vectors keep their capacity.
 struct FrameSlot {
   FrameTicket ticket;
@@ -32,8 +43,7 @@ struct FrameSlot {
   std::vector<PointMatch> points;  // in pixels of its ideal image
   ImageView image;                 // of `pixels`, or the host's own planes until they are released
   std::vector<uint8_t> pixels;
-  void (*release)(void* user) = nullptr;
-  void* release_user = nullptr;
+  ImageRelease release;
   std::vector<FrameTicket> dropped_before;  // frames whose place this one took, oldest first
 
   Status detection = Ok();
@@ -46,7 +56,9 @@ struct FrameSlot {
   void Assign(const SessionFrame& frame, const Rectifier& frame_rectifier, int64_t now_ns);
 
   /// Gives a borrowed image back, once; does nothing for a copied one.
-  void ReleaseImage();
+  void ReleaseImage() { TakeRelease()(); }
+  /// What will give it back, for callers that have to leave a lock first.
+  ImageRelease TakeRelease() { return std::exchange(release, {}); }
 };
 
 /// kInvalidArgument naming the first value of the frame that is broken.

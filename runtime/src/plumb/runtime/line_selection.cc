@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "plumb/geometry/line_projection.h"
+#include "plumb/map/depth_view.h"
 #include "plumb/runtime/covariance_factor.h"
 
 namespace plumb {
@@ -22,17 +23,18 @@ constexpr double kSearchMarginPx = 100.0, kSearchMarginPxPerRad = 400.0;
 constexpr double kRankMarginPx = 30.0;
 const VisibilityOptions kVisibility;
 
-// Deviations of a lifted end point: along its ray from depth, across it from the segment's pixels.
-constexpr double kDepthQuadratic = 0.004, kDepthConstantM = 0.003, kPixelSigma = 0.7;
+// Of a lifted end point: its depth's deviation moves it along its ray, its pixels' across it.
+constexpr DepthNoise kDepthNoise;
+constexpr double kPixelSigma = 0.7;
 
 Eigen::Matrix3d LiftedCovariance(const KeyFrame& key_frame, const Eigen::Vector3d& axis,
                                  const Eigen::Vector3d& center, const Eigen::Vector3d& x_in_world) {
   const Eigen::Vector3d ray = x_in_world - center;
   const double depth = axis.dot(ray);
   const double across = kPixelSigma * depth / key_frame.camera.MeanFocal();
-  const double along = kDepthQuadratic * depth * depth + kDepthConstantM;
+  const double relative = kDepthNoise.SigmaAt(depth) / depth;
   return across * across * Eigen::Matrix3d::Identity() +
-         (along * along - across * across) / ray.squaredNorm() * ray * ray.transpose();
+         (relative * relative - across * across / ray.squaredNorm()) * ray * ray.transpose();
 }
 
 // Seen from about the same side and distance as in the key frame that lifted it.

@@ -25,7 +25,8 @@ class OneToOneSolver {
              std::span<const PointObservation> points, LineResidual residual,
              Rigid3* cam_from_world);
 
-  /// The matches of the last solution.
+  /// The last one-to-one matches: those of the solution, or those at its pose where they were too
+  /// few for another.
   const std::vector<LineAssignment>& assignments() const { return assignments_; }
 
  private:

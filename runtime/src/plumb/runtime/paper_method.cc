@@ -63,7 +63,7 @@ PoseSupport PaperMethod::MeasureSupport(const Camera& camera, const Rigid3& cam_
   return support_meter_.Measure(projected_, segments_.table);
 }
 
-void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
+void PaperMethod::Refine(const RefineInput& input, const Rigid3& kept, RefineResult* result) {
   const int64_t start_ns = NowNs();
   const Rigid3& prior = input.prior.cam_from_world;
   segments_.Assign(input.segments, kMaxSegments);
@@ -86,7 +86,7 @@ void PaperMethod::Refine(const RefineInput& input, RefineResult* result) {
   }
   const LineEquations terms = AccumulateLines(input.camera, refined, observations_, kRobust);
   const Matrix6d prior_information = CovarianceOf(input.prior).inverse();
-  const PoseSupport prior_support = MeasureSupport(input.camera, prior);
+  const PoseSupport prior_support = MeasureSupport(input.camera, kept);
   const GateEvidence evidence{
       .refined = MeasureSupport(input.camera, refined),  // last: projects for the evidence
       .prior = prior_support,

@@ -24,7 +24,9 @@ class PaperMethod {
  public:
   PaperMethod(const MapIndex& index, const PoseRefinerOptions& options);
 
-  void Refine(const RefineInput& input, RefineResult* result);
+  /// @param input  With FuseGravity() applied to its prior.
+  /// @param kept   The prior's own pose, which is the answer unless a better one is found.
+  void Refine(const RefineInput& input, const Rigid3& kept, RefineResult* result);
 
  private:
   /// A key frame's segments whose fused lines are known.

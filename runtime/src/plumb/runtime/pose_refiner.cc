@@ -30,6 +30,19 @@ std::string_view ToString(RefineStatus status) {
   return "UNKNOWN";
 }
 
+RefineStages& RefineStages::operator+=(const RefineStages& other) {
+  for (int64_t RefineStages::*stage :
+       {&RefineStages::index_ns, &RefineStages::field_ns, &RefineStages::score_ns,
+        &RefineStages::coarse_ns, &RefineStages::fine_ns, &RefineStages::support_ns,
+        &RefineStages::local_ns, &RefineStages::points_ns, &RefineStages::joint_ns,
+        &RefineStages::covariance_ns, &RefineStages::report_ns}) {
+    this->*stage += other.*stage;
+  }
+  num_hypotheses += other.num_hypotheses;
+  out_of_time |= other.out_of_time;
+  return *this;
+}
+
 Status PoseRefinerOptions::Validate() const {
   if (num_hypotheses && (*num_hypotheses < 1 || *num_hypotheses > 2048)) {
     return Error{ErrorCode::kInvalidArgument,
@@ -43,10 +56,16 @@ Status PoseRefinerOptions::Validate() const {
     return Error{ErrorCode::kInvalidArgument,
                  "time_budget_ns " + std::to_string(time_budget_ns) + " is negative"};
   }
+  if (time_budget_ns > 0 && method == RefineMethod::kPaper) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "time_budget_ns " + std::to_string(time_budget_ns) +
+                     ": the paper's method leaves nothing out, it takes no budget"};
+  }
   return Ok();
 }
 
 struct PoseRefiner::Impl {
+  PoseRefinerOptions options;
   std::optional<SearchMethod> search;
   std::optional<PaperMethod> paper;
   std::vector<PosePrior> more_priors;  // of a frame, with gravity
@@ -55,10 +74,13 @@ struct PoseRefiner::Impl {
 PoseRefiner::PoseRefiner(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 PoseRefiner::~PoseRefiner() = default;
 
+const PoseRefinerOptions& PoseRefiner::options() const { return impl_->options; }
+
 Result<std::unique_ptr<PoseRefiner>> PoseRefiner::Create(const MapIndex& index,
                                                          const PoseRefinerOptions& options) {
   if (Status status = options.Validate(); !status) return status.error();
   auto impl = std::make_unique<Impl>();
+  impl->options = options;
   if (options.method == RefineMethod::kPaper) {
     impl->paper.emplace(index, options);
   } else {
@@ -91,9 +113,9 @@ Status PoseRefiner::Refine(const RefineInput& input, RefineResult* out_result) {
   }
   fused.more_priors = impl_->more_priors;
   if (impl_->search) {
-    impl_->search->Refine(fused, out_result);
+    impl_->search->Refine(fused, input.prior.cam_from_world, out_result);
   } else {
-    impl_->paper->Refine(fused, out_result);
+    impl_->paper->Refine(fused, input.prior.cam_from_world, out_result);
   }
   out_result->total_ns =
       std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - start)

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "plumb/base/deadline.h"
 #include "plumb/base/result.h"
 #include "plumb/geometry/camera.h"
 #include "plumb/geometry/rigid3.h"
@@ -76,9 +77,11 @@ struct PoseRefinerOptions {
   double min_map_support = 0.05;
   /// Seed of the search's random draws; the frame's `seed` is mixed in.
   uint64_t seed = 0;
-  /// Time that a frame may take, about; 0: as long as it takes, and reproducible. When it runs out,
-  /// hypotheses, alignment levels, further starts, further priors, the second attempt and the last
-  /// steps are left out, in this order as they come; the acceptance gate never is. >= 0.
+  /// Time that a frame may take, about; 0: as long as it takes, and reproducible. As it runs out,
+  /// hypotheses, alignment levels, further starts, further priors, further attempts and the last
+  /// steps are left out; RefineStages::out_of_time tells. The acceptance gate never is: a pose with
+  /// so little evidence that its rivals have to be looked for is kAmbiguous where there is no time
+  /// to. A frame takes about as long as one with 96 hypotheses in any case. Not for kPaper. >= 0.
   int64_t time_budget_ns = 0;
 
   Status Validate() const;
@@ -97,6 +100,9 @@ struct RefineInput {
   /// False: local refinement only, for priors within about 2 cm / 0.5 deg (stream mode).
   bool search = true;
   uint64_t seed = 0;  // e.g. the frame's number; equal inputs and seeds give equal results
+  /// What is left of the frame's time, for frames that several calls work on. Absent: all of
+  /// PoseRefinerOptions::time_budget_ns.
+  std::optional<Deadline> deadline = std::nullopt;
 };
 
 /// Segment `segment` of the input explained by map line `line`.
@@ -119,8 +125,10 @@ struct RefineStages {
   int64_t joint_ns = 0;       // lines and points together
   int64_t covariance_ns = 0;  // and observability
   int64_t report_ns = 0;      // matches at the final pose
-  uint32_t num_hypotheses = 0;
+  uint32_t num_hypotheses = 0;  // that were scored
   bool out_of_time = false;  // something was left out for the time budget
+
+  RefineStages& operator+=(const RefineStages& other);
 };
 
 struct RefineResult {
@@ -148,7 +156,7 @@ struct RefineResult {
 };
 
 /// Refines poses against one map. Not thread-safe; use one per thread. After the first few frames
-/// Refine() allocates only what `out_result` needs to grow.
+/// Refine() allocates only what `out_result` needs to grow, by kSearch with kPerpendicular.
 class PoseRefiner {
  public:
   /// `index` is borrowed and must outlive the refiner.
@@ -159,6 +167,8 @@ class PoseRefiner {
   /// @return kInvalidArgument naming the value if a pose, camera, uncertainty, segment or point is
   ///         not finite or out of range. "No better pose" is a status, not an error.
   Status Refine(const RefineInput& input, RefineResult* out_result);
+
+  const PoseRefinerOptions& options() const;
 
  private:
   struct Impl;

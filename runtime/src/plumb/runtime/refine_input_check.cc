@@ -8,8 +8,7 @@
 namespace plumb {
 namespace {
 
-// A prior this uncertain is no prior; a tighter one would divide by zero.
-constexpr double kMaxPositionSigmaM = 1e3, kMaxRotationSigmaRad = 3.2, kMinSigma = 1e-9;
+constexpr double kMinSigma = 1e-9;
 constexpr double kMaxGravitySigmaRad = 1.0;
 constexpr double kUnitTolerance = 1e-3;
 // Coordinates beyond this are not pixels of any image [px].
@@ -21,14 +20,17 @@ bool IsPixel(const Eigen::Vector2d& p) {
   return std::abs(p.x()) < kMaxPixel && std::abs(p.y()) < kMaxPixel;  // False for NaN.
 }
 
+std::string Text(double value) {
+  char number[32];
+  std::snprintf(number, sizeof(number), "%.6g", value);
+  return number;
+}
 // "(1.5, nan)"
 std::string Text(std::initializer_list<double> values) {
   std::string text;
   for (const double value : values) {
-    char number[32];
-    std::snprintf(number, sizeof(number), "%.6g", value);
     text += text.empty() ? "(" : ", ";
-    text += number;
+    text += Text(value);
   }
   text += ")";
   return text;
@@ -44,79 +46,88 @@ Status CheckCamera(const Camera& camera) {
       " pixels is not a camera: focal lengths are finite and not 0, sizes positive");
 }
 
-Status CheckPrior(const PosePrior& prior) {
-  const Eigen::Quaterniond& q = prior.cam_from_world.rotation;
-  if (!q.coeffs().allFinite() || !(std::abs(q.norm() - 1.0) < kUnitTolerance)) {
-    return Invalid("prior rotation (x, y, z, w) = " + Text({q.x(), q.y(), q.z(), q.w()}) +
-                   " is not a finite unit quaternion");
-  }
-  if (!prior.cam_from_world.translation.allFinite()) {
-    return Invalid("prior translation " + Text(prior.cam_from_world.translation) +
-                   " is not finite");
-  }
-  const auto in_range = [](double sigma, double max) { return sigma >= kMinSigma && sigma <= max; };
-  if (!in_range(prior.position_sigma_m, kMaxPositionSigmaM)) {
-    return Invalid("prior position uncertainty " + std::to_string(prior.position_sigma_m) +
-                   " m is not in (0, 1000]");
-  }
-  if (!in_range(prior.rotation_sigma_rad, kMaxRotationSigmaRad)) {
-    return Invalid("prior rotation uncertainty " + std::to_string(prior.rotation_sigma_rad) +
-                   " rad is not in (0, 3.2]");
-  }
-  return prior.gravity ? CheckGravity(*prior.gravity) : Ok();
-}
-
-}  // namespace
-
-Status CheckGravity(const GravityPrior& gravity) {
+Status CheckGravity(const GravityPrior& gravity, const std::string& name) {
   const auto is_direction = [](const Eigen::Vector3d& v) {
     return std::isfinite(v.squaredNorm()) && v.norm() > kMinSigma;
   };
   if (!is_direction(gravity.down_in_camera)) {
-    return Invalid("prior gravity in the camera " + Text(gravity.down_in_camera) +
+    return Invalid(name + ": gravity in the camera " + Text(gravity.down_in_camera) +
                    " is not a direction");
   }
   if (!is_direction(gravity.down_in_world)) {
-    return Invalid("prior gravity in the world " + Text(gravity.down_in_world) +
+    return Invalid(name + ": gravity in the world " + Text(gravity.down_in_world) +
                    " is not a direction");
   }
   if (!(gravity.sigma_rad >= kMinSigma && gravity.sigma_rad <= kMaxGravitySigmaRad)) {
-    return Invalid("prior gravity uncertainty " + std::to_string(gravity.sigma_rad) +
-                   " rad is not in (0, 1]");
+    return Invalid(name + ": gravity uncertainty " + Text(gravity.sigma_rad) +
+                   " rad is not in [1e-9, 1]");
+  }
+  return Ok();
+}
+
+// `name` of the prior for messages.
+Status CheckPrior(const PosePrior& prior, const std::string& name) {
+  const Eigen::Quaterniond& q = prior.cam_from_world.rotation;
+  if (!q.coeffs().allFinite() || !(std::abs(q.norm() - 1.0) < kUnitTolerance)) {
+    return Invalid(name + ": rotation (x, y, z, w) = " + Text({q.x(), q.y(), q.z(), q.w()}) +
+                   " is not a finite unit quaternion");
+  }
+  if (!prior.cam_from_world.translation.allFinite()) {
+    return Invalid(name + ": translation " + Text(prior.cam_from_world.translation) +
+                   " is not finite");
+  }
+  const auto in_range = [](double sigma, double max) { return sigma >= kMinSigma && sigma <= max; };
+  if (!in_range(prior.position_sigma_m, kMaxPositionSigmaM)) {
+    return Invalid(name + ".position_sigma_m " + Text(prior.position_sigma_m) +
+                   " is not in [1e-9, 1000]");
+  }
+  if (!in_range(prior.rotation_sigma_rad, kMaxRotationSigmaRad)) {
+    return Invalid(name + ".rotation_sigma_rad " + Text(prior.rotation_sigma_rad) +
+                   " is not in [1e-9, 3.2]");
+  }
+  return prior.gravity ? CheckGravity(*prior.gravity, name) : Ok();
+}
+
+}  // namespace
+
+Status CheckPriors(const PosePrior& prior, std::span<const PosePrior> more_priors) {
+  if (Status status = CheckPrior(prior, "prior"); !status) return status;
+  if (more_priors.size() > kMaxMorePriors) {
+    return Invalid("more_priors has " + std::to_string(more_priors.size()) +
+                   " entries, more than " + std::to_string(kMaxMorePriors));
+  }
+  for (size_t i = 0; i < more_priors.size(); ++i) {
+    const std::string name = "more_priors[" + std::to_string(i) + "]";
+    if (Status status = CheckPrior(more_priors[i], name); !status) return status;
+  }
+  return Ok();
+}
+
+Status CheckPoints(std::span<const PointMatch> points) {
+  for (size_t i = 0; i < points.size(); ++i) {
+    const PointMatch& point = points[i];
+    const std::string name = "points[" + std::to_string(i) + "]";
+    if (!IsPixel(point.pixel)) {
+      return Invalid(name + " at " + Text(point.pixel) + " is not in pixels of an image");
+    }
+    if (!point.point_in_world.allFinite() || !point.deviation_in_world.allFinite()) {
+      return Invalid(name + " in the world " + Text(point.point_in_world) + " with deviation " +
+                     Text(point.deviation_in_world) + " is not finite");
+    }
   }
   return Ok();
 }
 
 Status CheckRefineInput(const RefineInput& input) {
   if (Status status = CheckCamera(input.camera); !status) return status;
-  if (Status status = CheckPrior(input.prior); !status) return status;
-  if (input.more_priors.size() > kMaxMorePriors) {
-    return Invalid("more_priors has " + std::to_string(input.more_priors.size()) +
-                   " entries, more than " + std::to_string(kMaxMorePriors));
-  }
-  for (size_t i = 0; i < input.more_priors.size(); ++i) {
-    if (Status status = CheckPrior(input.more_priors[i]); !status) {
-      return Invalid("more_priors[" + std::to_string(i) + "]: " + status.error().message);
-    }
-  }
+  if (Status status = CheckPriors(input.prior, input.more_priors); !status) return status;
   for (size_t i = 0; i < input.segments.size(); ++i) {
     const Segment2& segment = input.segments[i];
     if (IsPixel(segment.start) && IsPixel(segment.end)) continue;
     return Invalid("segment " + std::to_string(i) + " from " + Text(segment.start) + " to " +
                    Text(segment.end) + " is not in pixels of an image");
   }
-  for (size_t i = 0; i < input.points.size(); ++i) {
-    const PointMatch& point = input.points[i];
-    if (!IsPixel(point.pixel)) {
-      return Invalid("point " + std::to_string(i) + " at " + Text(point.pixel) +
-                     " is not in pixels of an image");
-    }
-    if (!point.point_in_world.allFinite() || !point.deviation_in_world.allFinite()) {
-      return Invalid("point " + std::to_string(i) + " in the world " + Text(point.point_in_world) +
-                     " with deviation " + Text(point.deviation_in_world) + " is not finite");
-    }
-  }
-  return Ok();
+  return CheckPoints(input.points);
 }
 
 }  // namespace plumb

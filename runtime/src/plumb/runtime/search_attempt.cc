@@ -147,10 +147,11 @@ std::span<const FoundPose> SearchMethod::FindStarts(const Trial& trial, const Pl
   }
   const std::span<const FoundPose> found = pose_search_.Search(
       RegionOf(prior), lines_to_find_, search, MixSeeds(options_.seed, input.seed));
-  const PoseSearchTimes& times = pose_search_.times();
-  stages_.score_ns += times.draw_ns + times.score_ns;
-  stages_.coarse_ns += times.align_ns;
-  stages_.num_hypotheses += plan.num_hypotheses;
+  const PoseSearchStats& stats = pose_search_.stats();
+  stages_.score_ns += stats.draw_ns + stats.score_ns;
+  stages_.coarse_ns += stats.align_ns;
+  stages_.num_hypotheses += stats.num_scored;
+  stages_.out_of_time |= stats.out_of_time;
   return found;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "plumb/base/stopwatch.h"
 #include "plumb/refine/uncertainty.h"
@@ -57,14 +58,14 @@ SearchMethod::SearchMethod(const MapIndex& index, const PoseRefinerOptions& opti
       last_steps_(index, &fine_lines_),
       expected_evidence_(index) {}
 
-void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
+void SearchMethod::Refine(const RefineInput& input, const Rigid3& kept, RefineResult* result) {
   Stopwatch whole, watch;
   stages_ = {};
   search_ns_ = 0;
-  deadline_ = Deadline(options_.time_budget_ns);
+  deadline_ = input.deadline ? *input.deadline : Deadline(options_.time_budget_ns);
   fine_lines_.Forget();
   is_image_set_ = false;
-  kept_ = input.prior.cam_from_world;
+  kept_ = kept;
   segments_.Assign(input.segments, kMaxSegments);
   AcceptPoints(input);
   last_steps_.Begin({input.camera, &segments_, observed_points_, &all_points_});
@@ -78,10 +79,14 @@ void SearchMethod::Refine(const RefineInput& input, RefineResult* result) {
   result->runner_up_ratio = choice.runner_up_ratio;
   if (input.search && choice.status == RefineStatus::kRefined &&
       attempt.status == RefineStatus::kRefined && attempt.best.IsWeak() &&
-      !HoldsByPoints(trial.input, trial.points) && !IsOutOfTime(kWideningShare)) {
-    LookFarther(&trial);
-    result->status = attempt.status;
-    result->runner_up_ratio = std::max(result->runner_up_ratio, attempt.evidence.runner_up_ratio);
+      !HoldsByPoints(trial.input, trial.points)) {
+    if (IsOutOfTime(kWideningShare)) {
+      result->status = RefineStatus::kAmbiguous;  // nobody has looked for rivals
+    } else {
+      LookFarther(&trial);
+      result->status = attempt.status;
+      result->runner_up_ratio = std::max(result->runner_up_ratio, attempt.evidence.runner_up_ratio);
+    }
   }
   result->map_support = attempt.evidence.refined.map_share;
   result->evidence_nats = attempt.evidence.evidence_nats;
@@ -120,8 +125,7 @@ void SearchMethod::BeginTrials(const RefineInput& input) {
     Stopwatch watch;
     trial.points = SolvePoints(trial.input);
     stages_.points_ns += watch.Lap();
-    try_deadline_ =
-        num_priors == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_priors - k));
+    try_deadline_ = deadline_.Part(1.0 / static_cast<double>(num_priors - k));
     trial.attempt = Try(trial, {.prior = trial.prior,
                                 .num_hypotheses = NumHypotheses(trial.prior),
                                 .is_last = !input.search});
@@ -180,7 +184,7 @@ void SearchMethod::WidenTrials() {
     if (!ShouldWiden(trial)) continue;
     if (IsOutOfTime(kWideningShare)) return;
     const PosePrior wide = widened(trial);
-    try_deadline_ = num_left == 1 ? deadline_ : deadline_.Part(1.0 / static_cast<double>(num_left));
+    try_deadline_ = deadline_.Part(1.0 / static_cast<double>(num_left));
     --num_left;
     const Attempt second = Try(trial, {.prior = wide, .num_hypotheses = num_hypotheses(trial)});
     const bool is_refined = second.status == RefineStatus::kRefined;
@@ -212,9 +216,13 @@ void SearchMethod::LookCloser() {
     close.cam_from_world = trial.attempt.best.alignment.cam_from_world;
     close.position_sigma_m = std::min(close.position_sigma_m, kClosePositionM);
     close.rotation_sigma_rad = std::min(close.rotation_sigma_rad, kCloseRotationRad);
+    if (close.gravity) {  // never less certain of the tilt than without it
+      close.gravity->sigma_rad =
+          std::min(close.gravity->sigma_rad, close.rotation_sigma_rad / std::numbers::sqrt3);
+    }
     const uint32_t num_hypotheses = std::min(NumHypotheses(close), kCloseHypotheses);
     num_tried_ += CountDistinctPoses(close, num_hypotheses);
-    try_deadline_ = deadline_;
+    try_deadline_ = deadline_.Part(1.0);
     const Attempt second =
         Try(trial,
             {.prior = close, .num_hypotheses = num_hypotheses, .is_close = true, .is_last = true});
@@ -257,7 +265,7 @@ PriorChoice SearchMethod::Choose(const Camera& camera) {
 void SearchMethod::Finish(const PosePrior& prior, FineAlignment alignment, RefineResult* result) {
   Stopwatch watch;
   if (options_.residual == LineResidual::kMidpointAngle) {
-    last_steps_.SolveOneToOne(&alignment);
+    if (!IsOutOfTime(kLastStepsShare)) last_steps_.SolveOneToOne(&alignment);
   } else {
     last_steps_.ForgetLocalLines();
     if (!IsOutOfTime(kLastStepsShare)) {
@@ -302,7 +310,7 @@ bool SearchMethod::HoldsByPoints(const RefineInput& input, const PointPose& poin
 
 void SearchMethod::LookFarther(Trial* trial) {
   const PosePrior wide = Widened(trial->prior, kRivalFactor);
-  try_deadline_ = deadline_;
+  try_deadline_ = deadline_.Part(1.0);
   num_tried_ += CountDistinctPoses(wide, kMaxHypotheses);
   const Attempt second = Try(*trial, {.prior = wide, .num_hypotheses = kMaxHypotheses});
   Attempt& attempt = trial->attempt;

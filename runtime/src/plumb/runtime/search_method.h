@@ -33,7 +33,9 @@ class SearchMethod {
  public:
   SearchMethod(const MapIndex& index, const PoseRefinerOptions& options);
 
-  void Refine(const RefineInput& input, RefineResult* result);
+  /// @param input  With FuseGravity() applied to its priors.
+  /// @param kept   The first prior's own pose, which is the answer unless a better one is found.
+  void Refine(const RefineInput& input, const Rigid3& kept, RefineResult* result);
 
  private:
   static constexpr size_t kMaxSurvivors = 4;
@@ -149,7 +151,7 @@ class SearchMethod {
   PointTable all_points_;
   std::vector<uint32_t> key_frames_;
   // Of this frame:
-  Rigid3 kept_;                // the pose that is returned unless a better one is found
+  Rigid3 kept_;                // the caller's pose, returned unless a better one is found
   std::vector<Trial> trials_;  // of its priors, in their order
   std::vector<PriorOutcome> outcomes_;
   uint32_t num_tried_ = 0;     // poses that can be told apart, in all attempts until now

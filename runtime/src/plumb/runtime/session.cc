@@ -4,6 +4,7 @@
 #include <chrono>
 #include <exception>
 #include <mutex>
+#include <new>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -27,15 +28,28 @@ int64_t NowNs() {
       .count();
 }
 
-// The worker must survive whatever a library below throws (out of memory, mostly).
+// Short enough to need no memory itself.
+Error OutOfMemory() { return {ErrorCode::kOutOfMemory, "out of memory"}; }
+
+Error Failed(const char* what) {
+  try {
+    return {ErrorCode::kInternal, std::string("Session: a frame failed: ") + what};
+  } catch (const std::bad_alloc&) {
+    return OutOfMemory();
+  }
+}
+
+// The worker must survive whatever is thrown below it.
 template <typename Fn>
 Status Contain(Fn&& fn) {
   try {
     return fn();
+  } catch (const std::bad_alloc&) {
+    return OutOfMemory();
   } catch (const std::exception& e) {
-    return Error{ErrorCode::kInternal, std::string("Session: a frame failed: ") + e.what()};
+    return Failed(e.what());
   } catch (...) {
-    return Error{ErrorCode::kInternal, "Session: a frame failed with an unknown exception"};
+    return Failed("unknown exception");
   }
 }
 
@@ -77,6 +91,9 @@ struct Session::Impl {
   }
 
   Result<SubmitOutcome> Submit(const SessionFrame& frame);
+  // The part of it under the lock. @param out_release  Of the frame that was replaced.
+  Result<SubmitOutcome> Enqueue(const SessionFrame& frame, int64_t now_ns,
+                                ImageRelease* out_release);
 
   // The worker's steps.
   void Run();
@@ -121,6 +138,14 @@ Result<SubmitOutcome> Session::Impl::Submit(const SessionFrame& frame) {
   if (is_device_lost) {
     return Error{ErrorCode::kDeviceLost, "Session: the detector's device is lost"};
   }
+  ImageRelease release;
+  const Result<SubmitOutcome> outcome = Enqueue(frame, now_ns, &release);
+  release();  // The host may submit the next frame in there.
+  return outcome;
+}
+
+Result<SubmitOutcome> Session::Impl::Enqueue(const SessionFrame& frame, int64_t now_ns,
+                                             ImageRelease* out_release) {
   const std::scoped_lock submit_lock(submit_mutex);
   if (last_timestamp_ns && frame.timestamp_ns <= *last_timestamp_ns) {
     return Error{ErrorCode::kInvalidArgument,
@@ -137,22 +162,22 @@ Result<SubmitOutcome> Session::Impl::Submit(const SessionFrame& frame) {
   }
   FrameSlot* slot = queue.BeginPush(options.submit_timeout_ns);
   if (slot == nullptr) return SubmitOutcome::kTimedOut;
+  FrameSlot* replaced = nullptr;
   try {
     slot->Assign(frame, rectifier, now_ns);
+    slot->ticket.index = num_submitted;
+    const std::scoped_lock lock(stats_mutex);  // counted before it can be done
+    replaced = queue.CommitPush(slot);
+    ++stats.submitted;
   } catch (...) {  // Out of memory: the slot must not be lost.
-    slot->release = nullptr;
+    slot->release = {};
     queue.Recycle(slot);
     throw;
   }
-  slot->ticket.index = num_submitted++;
+  ++num_submitted;
   last_timestamp_ns = frame.timestamp_ns;
-  {
-    const std::scoped_lock lock(stats_mutex);
-    ++stats.submitted;
-  }
-  FrameSlot* replaced = queue.CommitPush(slot);
   if (replaced == nullptr) return SubmitOutcome::kAccepted;
-  replaced->ReleaseImage();
+  *out_release = replaced->TakeRelease();
   queue.Recycle(replaced);
   return SubmitOutcome::kReplacedFrame;
 }
@@ -219,13 +244,13 @@ void Session::Impl::FinishFrame(FrameSlot* slot) {
   FrameOutcome outcome = FrameOutcome::kProcessed;
   if (!slot->detection) {
     outcome = FrameOutcome::kFailed;
-    result.error = slot->detection.error();
+    result.error = std::move(slot->detection).error();
   } else if (options.deadline_ns > 0 && NowNs() - ticket.submitted_ns > options.deadline_ns) {
     outcome = FrameOutcome::kLate;
-  } else if (const Status refined = Contain([&] { return RefineFrame(slot); }); !refined) {
+  } else if (Status refined = Contain([&] { return RefineFrame(slot); }); !refined) {
     BeginResult(ticket);  // The refiner may have left anything in there.
     outcome = FrameOutcome::kFailed;
-    result.error = refined.error();
+    result.error = std::move(refined).error();
   }
   Publish(outcome, ticket);
 }
@@ -274,8 +299,7 @@ void Session::Impl::BeginResult(const FrameTicket& ticket) {
   refined.covariance =
       PriorCovariance(ticket.prior.rotation_sigma_rad, ticket.prior.position_sigma_m);
   if (options.mode == SessionMode::kStream) {
-    const auto predicted =
-        PredictLocally(tracker.state(), options.stream, ticket.prior.cam_from_world);
+    const auto predicted = PredictLocally(tracker.state(), options.stream, ticket.prior);
     if (predicted) refined.cam_from_world = predicted->cam_from_world;
   }
 }

@@ -1,7 +1,10 @@
 #include "plumb/runtime/stream_policy.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+
+#include "plumb/runtime/refine_input_check.h"
 
 namespace plumb {
 namespace {
@@ -17,11 +20,11 @@ Status StreamOptions::Validate() const {
     return Error{ErrorCode::kInvalidArgument, std::string("StreamOptions: ") + name + " " +
                                                   std::to_string(value) + " is outside " + range};
   };
-  if (!(position_sigma_m > 0.0 && std::isfinite(position_sigma_m))) {
-    return invalid("position_sigma_m", position_sigma_m, "(0, inf)");
+  if (!(position_sigma_m > 0.0 && position_sigma_m <= kMaxPositionSigmaM)) {
+    return invalid("position_sigma_m", position_sigma_m, "(0, 1000]");
   }
-  if (!(rotation_sigma_rad > 0.0 && std::isfinite(rotation_sigma_rad))) {
-    return invalid("rotation_sigma_rad", rotation_sigma_rad, "(0, inf)");
+  if (!(rotation_sigma_rad > 0.0 && rotation_sigma_rad <= kMaxRotationSigmaRad)) {
+    return invalid("rotation_sigma_rad", rotation_sigma_rad, "(0, 3.2]");
   }
   if (!(lost_support_share >= 0.0 && lost_support_share < 1.0)) {
     return invalid("lost_support_share", lost_support_share, "[0, 1)");
@@ -33,11 +36,16 @@ Status StreamOptions::Validate() const {
 }
 
 std::optional<PosePrior> PredictLocally(const StreamState& state, const StreamOptions& options,
-                                        const Rigid3& tracker_cam_from_world) {
+                                        const PosePrior& tracker) {
   if (!state.last) return std::nullopt;
   const double growth = std::sqrt(1.0 + state.frames_without_success);
-  return PosePrior{PredictedPose(*state.last, tracker_cam_from_world),
-                   options.position_sigma_m * growth, options.rotation_sigma_rad * growth};
+  // A stream may be dark for hours.
+  const auto grown = [growth](double sigma, double of_tracker) {
+    return std::min(growth * sigma, std::max(sigma, of_tracker));
+  };
+  return PosePrior{PredictedPose(*state.last, tracker.cam_from_world),
+                   grown(options.position_sigma_m, tracker.position_sigma_m),
+                   grown(options.rotation_sigma_rad, tracker.rotation_sigma_rad)};
 }
 
 PosePrior SearchPrior(const StreamState& state, const PosePrior& tracker) {

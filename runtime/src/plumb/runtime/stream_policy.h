@@ -12,8 +12,8 @@
 namespace plumb {
 
 struct StreamOptions {
-  /// Norms of the prediction's uncertainty one frame after a success; grows with the square root
-  /// of the frames since then. > 0.
+  /// Norms of the prediction's uncertainty one frame after a success, (0, 1000] and (0, 3.2]; grow
+  /// with the square root of the frames since then, up to the tracker's own uncertainty.
   double position_sigma_m = 0.02;
   double rotation_sigma_rad = 0.00873;  // 0.5 deg
   /// A frame whose map support is below this share of the running mean counts as lost, in [0, 1).
@@ -43,9 +43,10 @@ inline bool IsSuccess(RefineStatus status) {
 
 /// The prior of the local refinement: the last refined pose moved by the tracker's own motion,
 /// (tracker_k * tracker_{k-1}^-1) * refined_{k-1}, with the small uncertainty of `options`.
+/// @param tracker  The host's prior of this frame.
 /// @return nullopt before the first frame: then the tracker's pose has to be searched from.
 std::optional<PosePrior> PredictLocally(const StreamState& state, const StreamOptions& options,
-                                        const Rigid3& tracker_cam_from_world);
+                                        const PosePrior& tracker);
 
 /// The prior of a search: the predicted pose with the tracker's full uncertainty.
 PosePrior SearchPrior(const StreamState& state, const PosePrior& tracker);

@@ -23,24 +23,28 @@ class StreamTracker {
   ///                    uncertainty of its drift, `search` is ignored. `more_priors` are tried
   ///                    when the stream has to be searched for.
   /// @param out_result  `cam_from_world` is the corrected prediction where there is nothing better,
-  ///                    not the tracker's pose. Its times include a failed local refinement.
+  ///                    not the tracker's pose. Its times and stages are those of all that was
+  ///                    tried; a time budget is the frame's, not of each of them.
   /// @return what PoseRefiner::Refine returns; after an error the stream is as it was before.
   Status Track(const RefineInput& input, RefineResult* out_result);
-
-  /// Forgets the stream: the next frame is searched from its own prior.
-  void Reset() { state_ = {}; }
 
   const StreamState& state() const { return state_; }
   /// Whether the last Track() needed the search.
   bool searched() const { return searched_; }
 
  private:
-  Status Search(const RefineInput& input, RefineResult* out_result);
+  /// PoseRefiner::Refine, with what it spends added up in `spent_`.
+  Status Refine(const RefineInput& input, RefineResult* out_result);
+  Status Search(const RefineInput& input, const Deadline& deadline, RefineResult* out_result);
 
   PoseRefiner* refiner_;
   StreamOptions options_;
   StreamState state_;
   RefineResult second_;  // keeps its memory
+  struct {
+    int64_t search_ns = 0, match_and_refine_ns = 0, total_ns = 0;
+    RefineStages stages;
+  } spent_;  // on the frame at hand
   bool searched_ = false;
 };
 

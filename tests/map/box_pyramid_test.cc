@@ -43,7 +43,10 @@ BoxQuery RandomQuery(std::mt19937* rng) {
 
 bool Touches(const Box& box, float reach, const BoxQuery& query) {
   for (size_t p = 0; p < BoxQuery::kPlanes; ++p) {
-    if (box.Support(query.normals[p]) + query.offsets[p] < 0.0) return false;
+    const Eigen::Vector3d& normal = query.normals[p];
+    const double farthest =
+        normal.cwiseProduct(box.lower).cwiseMax(normal.cwiseProduct(box.upper)).sum();
+    if (farthest + query.offsets[p] < 0.0) return false;
   }
   return box.DistanceTo(query.center) <= query.reach_factor * static_cast<double>(reach);
 }

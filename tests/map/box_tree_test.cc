@@ -36,19 +36,13 @@ TEST(Box, MeasuresDistanceFromItsSurfaceAndZeroInside) {
   EXPECT_DOUBLE_EQ(box.DistanceTo({4, 6, 3}), 5.0);
 }
 
-TEST(Box, SupportIsTheLargestProductOverItsCorners) {
-  const Box box = {{-1, -2, -3}, {4, 5, 6}};
-  EXPECT_EQ(box.Support({1, 0, 0}), 4.0);
-  EXPECT_EQ(box.Support({-1, 0, 0}), 1.0);
-  EXPECT_EQ(box.Support({1, -1, 2}), 4.0 + 2.0 + 12.0);
-}
-
 TEST(BoxTree, VisitsEveryBoxOnceWhenNothingIsPruned) {
   for (const size_t count : {1u, 2u, 4u, 5u, 9u, 100u, 1000u}) {
     const std::vector<Box> boxes = RandomBoxes(count, /*seed=*/1);
     const BoxTree tree(boxes);
     std::vector<uint32_t> visited, expected(count);
-    tree.ForEach([](uint32_t) { return true; }, [&](uint32_t i) { visited.push_back(i); });
+    tree.ForEachNearestFirst(
+        {0.5, 1.0, -2.0}, [](double) { return true; }, [&](uint32_t i) { visited.push_back(i); });
     std::sort(visited.begin(), visited.end());
     std::iota(expected.begin(), expected.end(), 0u);
     EXPECT_EQ(visited, expected) << count;
@@ -58,7 +52,6 @@ TEST(BoxTree, VisitsEveryBoxOnceWhenNothingIsPruned) {
 TEST(BoxTree, WithoutBoxesVisitsNothing) {
   const BoxTree tree({});
   EXPECT_THAT(tree.nodes(), IsEmpty());
-  tree.ForEach([](uint32_t) { return true; }, [](uint32_t) { FAIL(); });
   tree.ForEachNearestFirst(
       {0, 0, 0}, [](double) { return true; }, [](uint32_t) { FAIL(); });
 }
@@ -71,32 +64,6 @@ TEST(BoxTree, EveryNodeEnclosesItsBoxes) {
       ASSERT_TRUE(Encloses(node.box, boxes[tree.order()[i]]));
     }
   }
-}
-
-TEST(BoxTree, SkipsWhatIsBelowAPrunedNode) {
-  const std::vector<Box> boxes = RandomBoxes(500, /*seed=*/3);
-  const BoxTree tree(boxes);
-  const Box query = {{0, 0, 0}, {2, 2, 2}};
-  const auto overlaps = [&](const Box& box) {
-    return (box.lower.array() <= query.upper.array()).all() &&
-           (box.upper.array() >= query.lower.array()).all();
-  };
-  std::vector<uint32_t> found, expected;
-  size_t num_nodes = 0;
-  tree.ForEach(
-      [&](uint32_t node) {
-        ++num_nodes;
-        return overlaps(tree.nodes()[node].box);
-      },
-      [&](uint32_t i) {
-        if (overlaps(boxes[i])) found.push_back(i);
-      });
-  for (uint32_t i = 0; i < boxes.size(); ++i) {
-    if (overlaps(boxes[i])) expected.push_back(i);
-  }
-  std::sort(found.begin(), found.end());
-  EXPECT_EQ(found, expected);
-  EXPECT_LT(num_nodes, tree.nodes().size() / 2) << "The tree saved no work.";
 }
 
 TEST(BoxTree, FindsTheNearestBoxByVisitingFewNodes) {

@@ -16,7 +16,7 @@ struct PixelScores {
 /// to one within 0.01 of the image's diagonal (PixelMatcher), and sums matched, drawn and annotated
 /// pixels over all images, once for each of the score thresholds 0.02, 0.04 .. 0.98.
 /// Precision and recall 0 where nothing is drawn or annotated.
-/// Source: Huang et al., "Learning to Parse Wireframes", CVPR 2018, Sec. 5; docs/method.md.
+/// Source: Huang et al., "Learning to Parse Wireframes", CVPR 2018, Sec. 5; docs/evaluation.md.
 PixelScores EvaluatePixels(std::span<const LineEvaluation> images);
 
 }  // namespace plumb::tools

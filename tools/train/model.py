@@ -1,4 +1,4 @@
-"""VLSE line segment network (docs/method.md): stacked hourglass with basic or hybrid blocks and three heads at stride 4.
+"""VLSE line segment network of the PtLine paper: stacked hourglass with basic or hybrid blocks and three heads at stride 4.
 
 Module names are the tensor names of the weights file, so `state_dict()` is the file's content (less `aux` and counters).
 """

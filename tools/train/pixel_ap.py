@@ -1,4 +1,4 @@
-"""Pixel metrics F^H and AP^H of line segments (docs/method.md), the same numbers as tools/metrics/pixel_ap.h."""
+"""Pixel metrics F^H and AP^H of line segments (docs/evaluation.md), the same numbers as tools/metrics/pixel_ap.h."""
 import numpy as np
 
 THRESHOLDS = [k / 50 for k in range(49, 0, -1)]

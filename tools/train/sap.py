@@ -1,4 +1,4 @@
-"""Structural average precision of line segments, the L-CNN protocol (docs/method.md): scaled to 128 x 128, one hit per line."""
+"""Structural average precision of line segments, the L-CNN protocol (docs/evaluation.md): scaled to 128 x 128, one hit per line."""
 import numpy as np
 
 

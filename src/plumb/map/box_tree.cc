@@ -14,14 +14,12 @@ BoxTree::BoxTree(std::span<const Box> boxes) : order_(boxes.size()) {
   std::iota(order_.begin(), order_.end(), 0u);
   if (boxes.empty()) return;
   nodes_.reserve(boxes.size());
-  next_.reserve(boxes.size());
   Build(boxes, 0, static_cast<uint32_t>(boxes.size()));
 }
 
 void BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end) {
   const auto self = static_cast<uint32_t>(nodes_.size());
   nodes_.push_back({boxes[order_[begin]], begin, end, 0});
-  next_.push_back(0);
   Box& box = nodes_[self].box;
   // Twice the centres; the factor does not matter for the order.
   Box centers = {box.lower + box.upper, box.lower + box.upper};
@@ -44,7 +42,6 @@ void BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end) {
     nodes_[self].second_child = static_cast<uint32_t>(nodes_.size());
     Build(boxes, middle, end);
   }
-  next_[self] = static_cast<uint32_t>(nodes_.size());
 }
 
 }  // namespace plumb

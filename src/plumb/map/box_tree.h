@@ -23,10 +23,6 @@ struct Box {
   double DistanceTo(const Eigen::Vector3d& point) const {
     return (lower - point).cwiseMax(point - upper).cwiseMax(0.0).norm();
   }
-  /// Largest value of normal . x over the box.
-  double Support(const Eigen::Vector3d& normal) const {
-    return normal.cwiseProduct(lower).cwiseMax(normal.cwiseProduct(upper)).sum();
-  }
 };
 
 /// Immutable after construction. Halves the boxes at the median of their centres along the widest
@@ -47,32 +43,8 @@ class BoxTree {
   /// Indices of the boxes; a node's are order()[begin .. end).
   std::span<const uint32_t> order() const { return order_; }
 
-  /// Calls visit(box index) for every box whose node and ancestors pass keep(node index).
-  template <typename Keep, typename Visit>
-  void ForEach(Keep keep, Visit visit) const {
-    ForEachRange(keep, [&](uint32_t begin, uint32_t end) {
-      for (uint32_t i = begin; i < end; ++i) visit(order_[i]);
-    });
-  }
-
-  /// Calls visit(begin, end), a range of order(), for every leaf that passes with its ancestors.
-  template <typename Keep, typename Visit>
-  void ForEachRange(Keep keep, Visit visit) const {
-    uint32_t node = 0;
-    while (node < nodes_.size()) {
-      if (!keep(node)) {
-        node = next_[node];
-        continue;
-      }
-      if (nodes_[node].second_child == 0) {
-        visit(nodes_[node].begin, nodes_[node].end);
-      }
-      ++node;  // the first child, or what follows a leaf
-    }
-  }
-
-  /// As ForEach(), in an order that visits the children nearer to `point` first; keep(distance) is
-  /// asked just before a node is entered.
+  /// Calls visit(box index) for every box whose node and ancestors pass keep(distance), in an order
+  /// that visits the children nearer to `point` first; keep is asked just before a node is entered.
   template <typename Keep, typename Visit>
   void ForEachNearestFirst(const Eigen::Vector3d& point, Keep keep, Visit visit) const {
     struct Entry {
@@ -105,7 +77,6 @@ class BoxTree {
   void Build(std::span<const Box> boxes, uint32_t begin, uint32_t end);
 
   std::vector<Node> nodes_;
-  std::vector<uint32_t> next_;  // first node after each node's descendants
   std::vector<uint32_t> order_;
 };
 

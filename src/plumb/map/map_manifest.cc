@@ -182,7 +182,7 @@ Result<MapManifest> ParseMembers(const Json& root) {
   if (Member(root, "depth") != nullptr) {  // absent in older maps
     const auto depth = TextOf(root, "depth");
     const auto source = depth ? DepthSourceOf(*depth) : std::nullopt;
-    if (!source) return Corrupt("has a depth that is neither sensor nor views");
+    if (!source) return Corrupt("has a depth that is none of sensor, views and both");
     manifest.depth_source = *source;
   }
 

@@ -31,7 +31,7 @@ struct MatchEvidence {
 ///   nats = max_r [ sum over found lines of w_i log(r / p_i + 1 - r) + log(1 - r) sum of the other
 ///   w_i ]
 ///
-/// A segment stands for one line, the first in order; others that only it would explain say
+/// A segment stands for one line, the first in order; others to which it is the nearest say
 /// nothing. Among N poses that were tried, N exp(-nats) bounds the number expected to reach so much
 /// by chance if lines were independent. Source: docs/adr/0008-evidence-not-counts.md.
 ///

@@ -22,7 +22,6 @@ struct PointLiftOptions {
 /// Lifts the points with the depth of their nearest pixel and leaves out those that have none.
 /// @param points  of the taken image; what is lifted has its place in the ideal one.
 /// @param depth   Valid, of the taken image's size.
-/// Source: docs/method/association.md 2.11.
 std::vector<MapPoint> LiftPoints(const ImagePoints& points, const Rectifier& rectifier,
                                  const Rigid3& cam_from_world, const DepthView& depth,
                                  const PointLiftOptions& options = {});

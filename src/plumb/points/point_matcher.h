@@ -43,7 +43,6 @@ class PointMatcher {
   /// mutual), so that an image point may appear once for each. All matches are returned: whoever
   /// has a better pose than the prior drops those that do not fit it. Ordered by prior, then by key
   /// frame, nearest first, then by image point; no key frame twice.
-  /// Source: docs/method/association.md 2.11.
   void Match(const ImagePoints& points, const MapIndex& index,
              std::span<const Rigid3> priors_cam_from_world,
              std::vector<PointCorrespondence>* out_matches);

@@ -29,7 +29,7 @@ struct PointPose {
 /// A coarse pose: at wide baselines the inliers prefer a biased subset, so joint refinement takes
 /// all matches near the lines' pose instead. Deterministic.
 /// @return nullopt without a consensus of `min_inliers`.
-/// Source: Lepetit et al., IJCV 2009; docs/method/association.md 2.11.
+/// Source: Lepetit et al., IJCV 2009.
 std::optional<PointPose> EstimatePointPose(const Camera& camera,
                                            std::span<const PointCorrespondence> matches,
                                            const PointPoseOptions& options = {});

@@ -98,7 +98,12 @@ class CameraProblem {
  public:
   CameraProblem(const ImageCamera& start, std::span<const Rigid3> poses,
                 std::span<const Segment3> lines, const CameraAdjustmentOptions& options)
-      : options_(options), start_(start), camera_(start), poses_(poses) {
+      : options_(options),
+        start_(start),
+        unit_focal_px_(options.unit_focal_px.value_or(
+            Eigen::Vector2d(start.pinhole.fx, start.pinhole.fy))),
+        camera_(start),
+        poses_(poses) {
     for (const Segment3& line : lines) {
       anchored_.push_back(line.Length() > kMinLength ? std::optional(AnchorOf(line))
                                                      : std::nullopt);
@@ -148,10 +153,10 @@ class CameraProblem {
     line->anchors_in_world = {pose * line->anchors_in_world.start,
                               pose * line->anchors_in_world.end};
     line->across = pose.RotationMatrix() * line->across;
-    // Pixels of the start's ideal image; those of the image as taken differ by what the lens
+    // Pixels of an ideal image; those of the image as taken differ by what the lens
     // stretches there.
     std::unique_ptr<ceres::CostFunction> cost(LineInCameraCost::Create(
-        *line, {start_.pinhole.fx, start_.pinhole.fy}, *start, *end, options_.pixel_sigma_px));
+        *line, unit_focal_px_, *start, *end, options_.pixel_sigma_px));
     double* const delta = deltas_[sighting.line].data();
     const double* const blocks[] = {changes, delta};
     std::array<double, 2> residuals = {};
@@ -180,6 +185,7 @@ class CameraProblem {
 
   const CameraAdjustmentOptions options_;
   const ImageCamera start_;
+  const Eigen::Vector2d unit_focal_px_;
   ImageCamera camera_;
   const std::span<const Rigid3> poses_;
   std::vector<std::optional<AnchoredSegment>> anchored_;

@@ -7,6 +7,8 @@
 #include <optional>
 #include <span>
 
+#include <Eigen/Core>
+
 #include "plumb/geometry/rectifier.h"
 #include "plumb/geometry/rigid3.h"
 #include "plumb/geometry/segment.h"
@@ -28,6 +30,9 @@ struct CameraAdjustmentOptions {
   double distortion_sigma = 0.05;  // of k1 and k2
   int max_rounds = 3;              // undistortion is linearised once a round
   int max_iterations = 8;          // of a round
+  /// Focal lengths of the pixels that distances are measured in; absent: those of the start. Costs
+  /// compare in the same pixels only.
+  std::optional<Eigen::Vector2d> unit_focal_px = std::nullopt;
   /// Lines adjust to the camera as it is.
   bool camera_is_fixed = false;
 };
@@ -35,7 +40,7 @@ struct CameraAdjustmentOptions {
 struct AdjustedCamera {
   ImageCamera camera;
   /// Negative logarithm of the sightings' likelihood [nat], but for a constant; of an adjusted
-  /// camera with its prior. Compare costs of as many sightings only.
+  /// camera with its prior. Compare costs of as many sightings in the same pixels only.
   double cost = 0.0;
   size_t num_sightings = 0;  // that the camera can have imaged
 };

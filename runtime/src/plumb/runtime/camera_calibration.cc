@@ -61,6 +61,7 @@ class HeldOut {
     if (!camera) return false;
     CameraAdjustmentOptions fixed;
     fixed.camera_is_fixed = true;
+    fixed.unit_focal_px = Eigen::Vector2d(given_.pinhole.fx, given_.pinhole.fy);
     const auto before = AdjustCamera(given_, poses_, lines_, others, fixed);
     const auto after = AdjustCamera(camera->camera, poses_, lines_, others, fixed);
     // What a camera cannot have imaged must not count in its favour.

@@ -83,9 +83,11 @@ void SearchMethod::Refine(const RefineInput& input, const Rigid3& kept, RefineRe
     if (IsOutOfTime(kWideningShare)) {
       result->status = RefineStatus::kAmbiguous;  // nobody has looked for rivals
     } else {
-      LookFarther(&trial);
+      const bool is_another_pose = LookFarther(&trial);
       result->status = attempt.status;
-      result->runner_up_ratio = std::max(result->runner_up_ratio, attempt.evidence.runner_up_ratio);
+      result->runner_up_ratio =
+          std::max(is_another_pose ? 0.0 : result->runner_up_ratio,
+                   attempt.evidence.runner_up_ratio);
     }
   }
   result->map_support = attempt.evidence.refined.map_share;
@@ -308,7 +310,7 @@ bool SearchMethod::HoldsByPoints(const RefineInput& input, const PointPose& poin
          IsPlausible(points.cam_from_world, input.prior);
 }
 
-void SearchMethod::LookFarther(Trial* trial) {
+bool SearchMethod::LookFarther(Trial* trial) {
   const PosePrior wide = Widened(trial->prior, kRivalFactor);
   try_deadline_ = deadline_.Part(1.0);
   num_tried_ += CountDistinctPoses(wide, kMaxHypotheses);
@@ -317,7 +319,7 @@ void SearchMethod::LookFarther(Trial* trial) {
   if (second.status == RefineStatus::kRefined && second.best.nats > attempt.best.nats) {
     attempt = second;
     trial->prior = wide;
-    return;
+    return true;
   }
   if (attempt.best.is_by_key_frames) AskKeyFrames(trial->input, wide);
   // On the lines that the wide prior sees, as the supports of the survivors.
@@ -326,6 +328,7 @@ void SearchMethod::LookFarther(Trial* trial) {
   if (attempt.evidence.runner_up_ratio > MaxRunnerUpRatio(attempt.best.fused_nats)) {
     attempt.status = RefineStatus::kAmbiguous;
   }
+  return false;
 }
 
 bool SearchMethod::MayWiden(const Attempt& attempt) const {

@@ -104,8 +104,8 @@ class SearchMethod {
   bool MayWiden(const Attempt& attempt) const;
   /// Searches farther off than the prior says, for a pose that has been accepted on little
   /// evidence: takes one with more, and makes the trial ambiguous when another place has nearly as
-  /// much.
-  void LookFarther(Trial* trial);
+  /// much. @return whether it took another pose.
+  bool LookFarther(Trial* trial);
   /// The prior as a factor of the alignment: it decides only what the lines leave open.
   static PosePriorFactor WeakFactor(const PosePrior& prior);
   void AcceptPoints(const RefineInput& input);

@@ -180,8 +180,7 @@ const SearchMethod::Survivor& SearchMethod::AskKeyFrames(const RefineInput& inpu
     if (!(nats > survivor.nats)) continue;
     survivor.nats = nats;
     survivor.alignment = local;
-    survivor.support = MeasureSupport(input.camera, local.cam_from_world);
-    survivor.is_by_key_frames = true;
+    survivor.is_by_key_frames = true;  // its support stays that of the fused lines' own alignment
   }
   return *std::max_element(survivors_.begin(), survivors_.end(),
                            [](const Survivor& a, const Survivor& b) { return a.nats < b.nats; });

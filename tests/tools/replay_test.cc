@@ -421,6 +421,32 @@ TEST_F(Replay, OtherPeoplesDirectoriesAreNotReplaced) {
   EXPECT_THAT(Entries(dir_.path()), ::testing::ElementsAre("run"));
 }
 
+TEST_F(Replay, FilesBesideAnEarlierResultAreNotRemoved) {
+  const std::string arguments = ReplayArguments(Priors(), Map()) + " --overlays 2 --out ";
+  const std::string run = dir_ / "run", map = dir_ / "map", room = dir_ / "room";
+  const std::string synth = "synth --frames 2 --width 64 --height 64 --samples 1 --out " + room;
+  fs::copy(Map(), map, fs::copy_options::recursive);
+  for (int k = 0; k < 2; ++k) {  // the second time they replace themselves
+    ASSERT_EQ(RunPlumbline(arguments + run).exit_code, 0);
+    ASSERT_EQ(RunPlumbline(synth + (k == 0 ? "" : " --png")).exit_code, 0);
+  }
+  EXPECT_TRUE(fs::exists(room + "/rgb/000001.png"));
+  EXPECT_FALSE(fs::exists(room + "/rgb/000001.jpg"));
+  const struct {
+    std::string arguments, foreign;
+  } cases[] = {{arguments + run, "run/overlay-best.png"},
+               {synth, "room/rgb/mine.jpg"},
+               // With a sequence that is missing: refused before anything is read.
+               {BuildArguments(dir_ / "none") + " --out " + map, "map/README.txt"}};
+  for (const auto& c : cases) {
+    dir_.Write(c.foreign, "years of work");
+    const ProgramRun refused = RunPlumbline(c.arguments);
+    EXPECT_EQ(refused.exit_code, 73) << c.foreign << ": " << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(c.foreign.substr(c.foreign.find('/') + 1)));
+    EXPECT_EQ(ReadAll(dir_ / c.foreign), "years of work");
+  }
+}
+
 TEST_F(Replay, OutputsNeedAnExistingParent) {
   const ProgramRun run =
       RunPlumbline(ReplayArguments(Priors(), Map()) + " --out " + (dir_ / "no/run"));

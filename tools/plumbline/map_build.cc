@@ -29,6 +29,8 @@
 namespace plumb::tools {
 namespace {
 
+constexpr ResultFiles kMapFiles = {kMapManifestName, IsMapFile};
+
 struct MapBuildOptions {
   std::string sequence, frames, colmap, images, out;
   DetectorOptions detector;
@@ -269,7 +271,7 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   if (Outcome wrong = CheckOptions(options)) return wrong;
   BundleOptions bundle_options;
   if (Outcome failed = ReadPoseSigma(options, &bundle_options)) return failed;
-  if (Outcome failed = CheckReplaceable(options.out, "manifest.json")) return failed;
+  if (Outcome failed = CheckReplaceable(options.out, kMapFiles)) return failed;
   KeyFrameSource source;
   if (Outcome failed =
           options.colmap.empty()
@@ -301,7 +303,7 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   if (options.calibrate) Calibrate(builder, &map);
   WriteMapOptions write_options;
   write_options.overwrite = true;
-  if (const Status written = WriteMap(map, options.out, write_options); !written) {
+  if (const Status written = WriteMap(map, PlainPath(options.out), write_options); !written) {
     const bool io = written.error().code == ErrorCode::kIoError;
     return Failure{io ? kExitIo : kExitCannotCreate, written.error().message};
   }

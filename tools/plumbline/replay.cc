@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -31,6 +32,18 @@ struct ReplayOptions {
 
   ReplayOptions() { run.mode = "independent"; }
 };
+
+constexpr std::string_view kOverlayPrefix = "overlay-", kOverlayEnding = ".png";
+
+bool IsReplayFile(std::string_view name) {
+  if (name == "trajectory.txt" || name == "frames.jsonl" || name == "summary.json") return true;
+  if (!name.starts_with(kOverlayPrefix) || !name.ends_with(kOverlayEnding)) return false;
+  name.remove_prefix(kOverlayPrefix.size());
+  name.remove_suffix(kOverlayEnding.size());
+  return ParseTimestamp(name).has_value();
+}
+
+constexpr ResultFiles kReplayFiles = {"summary.json", IsReplayFile};
 
 /// Whether frame `index` of `num_frames` is one of `count` evenly spaced ones.
 bool IsPicked(size_t index, size_t num_frames, size_t count) {
@@ -70,7 +83,8 @@ class ReplayWriter {
                                         run_.sequence.rectifier, *run_.index, result);
     std::vector<uint8_t> png;
     cv::imencode(".png", picture, png);
-    return out_->Write("overlay-" + FormatTimestamp(result.timestamp_ns) + ".png",
+    const std::string time = FormatTimestamp(result.timestamp_ns);
+    return out_->Write(std::string(kOverlayPrefix) + time + std::string(kOverlayEnding),
                        std::string(png.begin(), png.end()));
   }
 
@@ -119,10 +133,10 @@ std::string ToText(const Json& summary) {
 Outcome RunReplay(const ReplayOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   OutputDirectory out;
-  if (Outcome failed = CheckReplaceable(options.out, "summary.json")) return failed;
+  if (Outcome failed = CheckReplaceable(options.out, kReplayFiles)) return failed;
   FrameRun run;
   if (Outcome failed = OpenFrameRun(options.run, &run)) return failed;
-  if (Outcome failed = out.Open(options.out, "summary.json")) return failed;
+  if (Outcome failed = out.Open(options.out, kReplayFiles)) return failed;
   ReplayWriter writer(run, options, &out);
   {
     ProgressBar progress("replay", run.frames.size());

@@ -3,9 +3,11 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/tools/temporary_directory.h"
@@ -340,6 +342,39 @@ TEST(ImageFile, TruncatedMissingAndEmptyFilesAreErrors) {
   EXPECT_EQ(ReadColorImage(dir.Write("empty.png", "")).error().code, ErrorCode::kCorruptData);
   EXPECT_EQ(ReadColorImage(dir.Write("text.png", "no image")).error().code,
             ErrorCode::kCorruptData);
+}
+
+TEST(ImageFile, AnImageThatIsCutOffAnywhereIsRefused) {
+  const TemporaryDirectory dir;
+  cv::Mat noise(48, 64, CV_8UC3);
+  cv::randu(noise, 0, 255);
+  const struct {
+    const char* name;
+    std::vector<int> parameters;
+  } forms[] = {{"a.jpg", {}},
+               {"progressive.jpg", {cv::IMWRITE_JPEG_PROGRESSIVE, 1}},
+               {"restarts.jpg", {cv::IMWRITE_JPEG_RST_INTERVAL, 4}},
+               {"a.png", {}}};
+  for (const auto& form : forms) {
+    cv::imwrite(dir / form.name, noise, form.parameters);
+    const std::string bytes = testing::ReadAll(dir / form.name);
+    EXPECT_TRUE(ReadColorImage(dir / form.name)) << form.name;
+    // Some cameras pad their files or append further data.
+    EXPECT_TRUE(ReadColorImage(dir.Write("padded", bytes + std::string(9, '\0')))) << form.name;
+    EXPECT_TRUE(ReadColorImage(dir.Write("longer", bytes + "trailer"))) << form.name;
+    for (const double share : {0.3, 0.5, 0.7, 0.9, 0.99}) {
+      const auto size = static_cast<size_t>(share * static_cast<double>(bytes.size()));
+      for (const std::string& padding : {std::string(), std::string(99, '\0')}) {
+        const auto cut = ReadColorImage(dir.Write("cut", bytes.substr(0, size) + padding));
+        ASSERT_FALSE(cut) << form.name << ' ' << share;
+        EXPECT_EQ(cut.error().code, ErrorCode::kCorruptData);
+      }
+    }
+  }
+  const std::string bytes = testing::ReadAll(dir / "a.jpg");
+  EXPECT_THAT(
+      ReadColorImage(dir.Write("cut.jpg", bytes.substr(0, bytes.size() - 1))).error().message,
+      HasSubstr("cut.jpg: ends before its image is complete"));
 }
 
 TEST(LineAnnotations, AreRead) {

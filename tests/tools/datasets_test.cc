@@ -207,6 +207,23 @@ TEST_F(Sequence, CameraErrorsNameTheMember) {
   }
 }
 
+/// Many levels of nesting: what recurses over them exhausts the stack.
+std::string DeepArray() { return std::string(200'000, '[') + std::string(200'000, ']'); }
+
+TEST_F(Sequence, NestedAndLongMembersAreRefusedInAShortMessage) {
+  for (const char* member : {"width", "fx", "model", "distortion_coefficients", "depth_scale"}) {
+    for (const std::string& value : {DeepArray(), "\"" + std::string(5000, 'x') + "\""}) {
+      const auto camera =
+          ParseCameraFile("{\"" + std::string(member) + "\": " + value +
+                              R"(, "width": 4, "height": 2, "fx": 1, "fy": 1, "cx": 0, "cy": 0})",
+                          "camera.json", true);
+      ASSERT_FALSE(camera) << member;
+      EXPECT_LT(camera.error().message.size(), 240u) << member;
+      EXPECT_THAT(camera.error().message, HasSubstr("camera.json: "));
+    }
+  }
+}
+
 TEST_F(Sequence, ReadsLensesUnderTheirNames) {
   const struct {
     const char* members;
@@ -401,6 +418,29 @@ TEST(LineAnnotations, RefuseBrokenEntries) {
     dir.Write("annotations.json", json);
     EXPECT_EQ(ReadLineAnnotations(dir.path()).error().code, ErrorCode::kCorruptData) << json;
   }
+}
+
+TEST(LineAnnotations, NestedFilesAreRefused) {
+  const TemporaryDirectory dir;
+  const std::string deep = DeepArray();
+  for (const std::string& json :
+       {deep, R"([{"filename": "a", "file": "a", "lines": [], "scores": )" + deep + "}]"}) {
+    dir.Write("annotations.json", json);
+    EXPECT_THAT(ReadLineAnnotations(dir.path()).error().message, HasSubstr("too deeply"));
+    EXPECT_THAT(ReadDetections(dir / "annotations.json", {{"a", 9, 9, {}}}).error().message,
+                HasSubstr("too deeply"));
+  }
+}
+
+TEST(Detections, OfOneFileTwiceAreRefused) {
+  const TemporaryDirectory dir;
+  const std::string path =
+      dir.Write("found.json", R"([{"file": "x/a.jpg", "lines": [], "scores": []},
+                                  {"file": "y/a.jpg", "lines": [], "scores": []}])");
+  const auto read = ReadDetections(path, {{"a.jpg", 9, 9, {}}});
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kCorruptData);
+  EXPECT_THAT(read.error().message, HasSubstr("image 1: want every file once, a.jpg"));
 }
 
 TEST(Detections, AreReadInTheImagesOrder) {

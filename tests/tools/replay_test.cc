@@ -503,6 +503,10 @@ TEST_F(Replay, EvalNeedsARunAndMatchingTruth) {
   const ProgramRun corrupt = RunPlumbline("eval trajectory --run " + (dir_ / "run") + rest);
   EXPECT_EQ(corrupt.exit_code, 65);
   EXPECT_THAT(corrupt.err, HasSubstr("frames.jsonl:1"));
+  dir_.Write("run/frames.jsonl", "{\"status\": \"REFINED\", \"covariance\": " +
+                                     std::string(20'000, '[') + std::string(20'000, ']') + "}\n");
+  const ProgramRun nested = RunPlumbline("eval trajectory --run " + (dir_ / "run") + rest);
+  EXPECT_EQ(nested.exit_code, 65);
   dir_.Write("run/frames.jsonl", "");
   const std::string truth = dir_.Write("truth.txt", "777 0 0 0 0 0 0 1\n");
   const ProgramRun apart = RunPlumbline("eval trajectory --run " + (dir_ / "run") + " --truth " +

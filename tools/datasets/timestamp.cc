@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "tools/datasets/text_file.h"
+
 namespace plumb::tools {
 namespace {
 
@@ -16,7 +18,7 @@ bool AllDigits(std::string_view text) {
 }
 
 Error Refused(std::string_view text, const char* reason) {
-  return Error{ErrorCode::kCorruptData, "\"" + std::string(text) + "\" " + reason};
+  return Error{ErrorCode::kCorruptData, "\"" + Shortened(text) + "\" " + reason};
 }
 
 }  // namespace

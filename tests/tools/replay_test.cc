@@ -389,6 +389,20 @@ TEST_F(Replay, BadPriorSizesAreWrongUsage) {
   for (const char* size : {"10", "10,", "0,1", "10,-2", "nan,1", "1,2,3"}) {
     ExpectFailure(ReplayArguments(Priors(), Map()) + " --prior-size " + size, 64, "--prior-size");
   }
+  for (const auto& [size, message] :
+       {std::pair("1e9,2", "1e+09 cm is outside 1e-07 to 100000"),
+        std::pair("10,200", "200 deg is outside 1e-07 to 183"),
+        std::pair("1e-12,1e-12", "1e-12 cm is outside"), std::pair("1,1e-12", "1e-12 deg is")}) {
+    ExpectFailure(ReplayArguments(Priors(), Map()) + " --prior-size " + size, 64, message);
+  }
+  const std::string replay = ReplayArguments(Priors(), Map());
+  for (const char* size : {"100000,183", "1e-7,1e-7"}) {
+    EXPECT_EQ(
+        RunPlumbline(replay + " --overlays 0 --out " + (dir_ / "run") + " --prior-size " + size)
+            .exit_code,
+        0)
+        << size;
+  }
 }
 
 TEST_F(Replay, TruncatedAndFlippedMapsAreBadData) {

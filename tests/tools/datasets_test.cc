@@ -1,6 +1,5 @@
 // Readers of data sets: timestamps, trajectories, sequences, images, annotations.
 #include <filesystem>
-#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -41,15 +40,16 @@ TEST(Timestamp, ReadsPlainDecimals) {
 }
 
 TEST(Timestamp, RefusesWhatIsNotExact) {
-  for (const char* text : {"", "-", ".5", "1e9", "nan", "1.0x", "1.2.3", "0.0000000001",
-                           "9223372037", "99999999999999999999"}) {
+  for (const char* text :
+       {"", "-", ".5", "1e9", "nan", "1.0x", "1.2.3", "0.0000000001", "9000000000.000000001",
+        "-9000000001", "9223372036", "99999999999999999999"}) {
     EXPECT_FALSE(ParseTimestamp(text)) << text;
   }
 }
 
 TEST(Timestamp, FormatIsTheInverse) {
   for (const int64_t ns : {int64_t{0}, int64_t{-1}, int64_t{66'667'000}, int64_t{-2'500'000'000},
-                           std::numeric_limits<int64_t>::max()}) {
+                           int64_t{-9'000'000'000'000'000'000}}) {
     EXPECT_EQ(*ParseTimestamp(FormatTimestamp(ns)), ns);
   }
   EXPECT_EQ(FormatTimestamp(66'667'000), "0.066667");
@@ -110,6 +110,8 @@ TEST(TumTrajectory, NamesFileLineAndValueOfWhatIsWrong) {
                {"2 0 0 0 0 0 0", "7 fields"},
                {"2 0 0 0 0 0 0 1 1", "9 fields"},
                {"2 0 x 0 0 0 0 1", "\"x\" is not a number"},
+               {"2 0 0 1e8 0 0 0 1", "more than 1e7 m from the origin"},
+               {"9000000001 0 0 0 0 0 0 1", "\"9000000001\" is beyond 9e9 s"},
                {"2 0 0 0 0 0 0 0.9", "norm is 0.9"},
                {"2 0 0 0 0 0 0 0", "norm is 0.0"},
                {"2s 0 0 0 0 0 0 1", "\"2s\" is not a timestamp"},
@@ -159,6 +161,16 @@ TEST(NearestPose, TakesTheEarlierAtATieAndKeepsTheTolerance) {
   EXPECT_EQ(NearestPose(trajectory, 16, 5), nullptr);
 }
 
+TEST(NearestPose, TimestampsMayBeAsFarApartAsTheyCan) {
+  constexpr int64_t kFar = 9'000'000'000'000'000'000;
+  const Trajectory trajectory{{-kFar, {}}, {kFar, {}}};
+  EXPECT_EQ(NearestPose(trajectory, 0, 5), nullptr);
+  EXPECT_EQ(NearestPose(trajectory, kFar - 1, 5)->timestamp_ns, kFar);
+  EXPECT_EQ(NearestPose(trajectory, kFar, 5)->timestamp_ns, kFar);
+  EXPECT_EQ(NearestPose(trajectory, -kFar, 5)->timestamp_ns, -kFar);
+  EXPECT_FALSE(PoseAt(trajectory, kFar - 1'000'000));
+}
+
 class Sequence : public ::testing::Test {
  protected:
   Sequence() {
@@ -198,6 +210,10 @@ TEST_F(Sequence, CameraErrorsNameTheMember) {
       {R"({"width": 4, "height": 2.5, "fx": 1, "fy": 1, "cx": 0, "cy": 0})", "\"height\" is 2.5"},
       {R"({"width": 4, "height": 2, "fx": 0, "fy": 1, "cx": 0, "cy": 0})", "is 0"},
       {R"({"width": 4, "height": 2, "fx": 1, "fy": 1, "cx": 0, "cy": 0})", "\"depth_scale\""},
+      {R"({"width": 4, "height": 2, "fx": 1, "fy": 1, "cx": 0, "cy": 0, "depth_scale": 1e-4})",
+       "\"depth_scale\" is 0.0001, want 1e-3 to 1e6"},
+      {R"({"width": 4, "height": 2, "fx": 1, "fy": 1, "cx": 0, "cy": 0, "depth_scale": 1e7})",
+       "\"depth_scale\" is 10000000.0, want"},
       {R"({"model": "FISHEYE"})", "\"FISHEYE\""}};
   for (const auto& c : cases) {
     dir_.Write("camera.json", c.json);

@@ -17,6 +17,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int kMaxSidePx = 16384;
+constexpr double kMinDepthScale = 1e-3, kMaxDepthScale = 1e6;
 constexpr const char* kCoefficients = "distortion_coefficients";
 
 struct ModelName {
@@ -139,9 +140,9 @@ Result<CameraFile> ParseCameraFile(const std::string& text, const std::string& p
   if (const Status read = reader.Number("depth_scale", &file.depth_scale); !read) {
     return read.error();
   }
-  if (!(file.depth_scale > 0.0)) {
+  if (!(file.depth_scale >= kMinDepthScale && file.depth_scale <= kMaxDepthScale)) {
     return reader.Corrupt("\"depth_scale\" is " + Shown(json["depth_scale"]) +
-                          ", want a positive number");
+                          ", want 1e-3 to 1e6 units per metre");
   }
   return file;
 }

@@ -164,6 +164,13 @@ TEST(Program, EvalLinesScoresAnAnnotatedFolder) {
   EXPECT_EQ(report["images"], 1);
   EXPECT_DOUBLE_EQ(report["sAP10"].get<double>(), 100.0);
   EXPECT_GT(report["ms_per_image"].get<double>(), 0.0);
+  const std::string curve = "eval lines --model lsd --data " + dir.path() + " --json --curve ";
+  const ProgramRun lost = RunPlumbline(curve + (dir / "no/curve.csv"));
+  EXPECT_EQ(lost.exit_code, 73);
+  EXPECT_EQ(json::parse(lost.out)["sAP10"], report["sAP10"]);
+  EXPECT_THAT(lost.err, HasSubstr("no/curve.csv"));
+  EXPECT_EQ(RunPlumbline(curve + (dir / "curve.csv")).exit_code, 0);
+  EXPECT_THAT(testing::ReadAll(dir / "curve.csv"), HasSubstr("threshold,precision"));
   dir.Write("annotations.json",
             R"([{"filename": "a.png", "width": 161, "height": 120, "lines": []}])");
   const ProgramRun wrong = RunPlumbline("eval lines --model lsd --data " + dir.path() + " --json");

@@ -324,6 +324,16 @@ TEST_F(Replay, RefinesEveryFrameAndSaysHowWell) {
   EXPECT_EQ(num_statuses, kNumQueries);
 }
 
+TEST_F(Replay, PathsNeedNotBeUtf8) {
+  const std::string map = dir_ / "m\xE4p", out = dir_ / "r\xFCn";
+  fs::copy(Map(), map, fs::copy_options::recursive);
+  const ProgramRun run =
+      RunPlumbline(ReplayArguments(Priors(), map) + " --overlays 0 --out " + out);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(ReadAll(out + "/summary.json"), run.out);
+  EXPECT_EQ(json::parse(run.out)["frames"], kNumQueries);
+}
+
 TEST_F(Replay, EqualInputsGiveEqualBytes) {
   for (const char* name : {"a", "b"}) {
     const ProgramRun run =
@@ -477,6 +487,25 @@ TEST_F(Replay, AMissingDepthImageStopsTheBuildAndLeavesNoMap) {
   EXPECT_THAT(run.out, IsEmpty());
   EXPECT_THAT(run.err, HasSubstr("depth/000003.png"));
   EXPECT_THAT(Entries(dir_.path()), IsEmpty());
+}
+
+TEST_F(Replay, AMapWithoutLinesReplacesNone) {
+  const TemporaryDirectory copy;
+  fs::copy(room_->path(), copy / "room", fs::copy_options::recursive);
+  json camera = json::parse(ReadAll(copy / "room/camera.json"));
+  camera["depth_scale"] = 1e-3;  // everything is farther off than depth reaches
+  copy.Write("room/camera.json", camera.dump());
+  fs::copy(Map(), dir_ / "map", fs::copy_options::recursive);
+  const std::string build = BuildArguments(copy / "room") + " --depth sensor --out ";
+  const ProgramRun run = RunPlumbline(build + (dir_ / "map"));
+  EXPECT_EQ(run.exit_code, 65) << run.err;
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(run.err, ::testing::ContainsRegex("room: none of the [0-9]+ segments got a depth"));
+  for (const auto& entry : fs::recursive_directory_iterator(Map())) {
+    const fs::path name = fs::relative(entry.path(), Map());
+    if (!entry.is_regular_file()) continue;
+    EXPECT_EQ(ReadAll(dir_ / "map/" + name.string()), ReadAll(entry.path().string())) << name;
+  }
 }
 
 TEST_F(Replay, ABrokenImageStopsTheReplayHalfWayAndLeavesNoRun) {

@@ -60,7 +60,7 @@ class ReplayWriter {
 
   Outcome Add(size_t index, const FrameResult& result) {
     trajectory_.push_back({result.timestamp_ns, result.refined.cam_from_world});
-    frames_jsonl_ += DescribeFrame(result).dump() + "\n";
+    frames_jsonl_ += ToJsonText(DescribeFrame(result), JsonLayout::kCompact);
     statistics_.Add(result);
     if (!IsPicked(index, run_.frames.size(), options_.overlays)) return std::nullopt;
     return WriteOverlay(index, result);
@@ -70,7 +70,7 @@ class ReplayWriter {
     if (Outcome failed = out_->Write("trajectory.txt", FormatTumTrajectory(trajectory_)))
       return failed;
     if (Outcome failed = out_->Write("frames.jsonl", frames_jsonl_)) return failed;
-    return out_->Write("summary.json", summary.dump(1) + "\n");
+    return out_->Write("summary.json", ToJsonText(summary));
   }
 
   const FrameStatistics& statistics() const { return statistics_; }

@@ -172,7 +172,7 @@ void AddReplay(CLI::App& program, PendingRun& pending) {
             .add_option("--overlay-brightness", options.overlay_brightness,
                         "Of the camera's image behind the lines: 1 as it is, 0 leaves it out, for "
                         "pictures that may be shown")
-            ->check(CLI::Range(0.0, 1.0))
+            ->check(FiniteRange(0.0, 1.0))
             ->capture_default_str();
         command.add_flag("--json", options.json, "Print the summary as JSON");
         command.footer(

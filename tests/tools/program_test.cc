@@ -79,9 +79,9 @@ TEST(Program, WrongOptionsAreWrongUsage) {
 
 TEST(Program, UnknownCommandsAreNamed) {
   for (const auto& [arguments, message] :
-       {std::pair("frobnicate", "plumbline has no command 'frobnicate'"),
-        std::pair("frobnicate --json", "plumbline has no command 'frobnicate'"),
-        std::pair("map frobnicate x", "plumbline map has no command 'frobnicate'"),
+       {std::pair("frobnicate", "plumbline: no command 'frobnicate'"),
+        std::pair("frobnicate --json", "plumbline: no command 'frobnicate'"),
+        std::pair("map frobnicate x", "plumbline: map: no command 'frobnicate'"),
         std::pair("map", "subcommand")}) {
     const ProgramRun run = RunPlumbline(arguments);
     EXPECT_EQ(run.exit_code, 64) << arguments;

@@ -95,7 +95,8 @@ Outcome CheckReplaceable(const std::string& path, const ResultFiles& files) {
   const std::string target = PlainPath(path);
   const std::string name = fs::path(target).filename().string();
   if (name.empty() || name == "." || name == "..") {
-    return CannotCreate(path, "want a directory's own name, which a result can be given");
+    return CannotCreate(path.empty() ? "\"\"" : path,
+                        "want a directory's own name, which a result can be given");
   }
   std::error_code code;
   if (fs::exists(fs::symlink_status(target, code))) {

@@ -52,16 +52,16 @@ void AddCommands(CLI::App& program, PendingRun& pending) {
 /// Says which word names no command; empty if that is not what is wrong.
 std::string UnknownCommand(const CLI::App& program) {
   const CLI::App* app = &program;
-  std::string path = "plumbline";
+  std::string path;
   while (!app->get_subcommands().empty()) {
     app = app->get_subcommands().front();
-    path += " " + app->get_name();
+    path += app->get_name() + ": ";
   }
   const std::vector<std::string> words = program.remaining(true);
   if (app->get_require_subcommand_min() == 0 || words.empty() || words.front().starts_with('-')) {
     return "";
   }
-  return path + " has no command '" + words.front() + "'";
+  return path + "no command '" + words.front() + "'";
 }
 
 int Fail(const Failure& failure) {

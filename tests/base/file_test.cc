@@ -1,5 +1,6 @@
 #include "plumb/base/file.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -108,6 +109,46 @@ TEST(WriteFileAtomically, FailsWithoutTraceWhereTheTargetIsADirectory) {
   EXPECT_EQ(WriteFileAtomically(root / "target", "x").error().code, ErrorCode::kIoError);
   EXPECT_EQ(WriteFileAtomically(root / "no/target", "x").error().code, ErrorCode::kNotFound);
   EXPECT_THAT(root.Names(), ElementsAre("target"));
+}
+
+TEST(WriteFileAtomically, ReplacesWhatALinkLeadsTo) {
+  const TemporaryDirectory root;
+  std::filesystem::create_directory(root / "disk");
+  Spill(root / "disk/file", "old");
+  std::filesystem::create_symlink("disk/file", root / "link");
+  std::filesystem::create_symlink(root / "link", root / "link2");
+  std::filesystem::create_symlink("disk/new", root / "dangling");
+  for (const char* name : {"link", "link2", "dangling"}) {
+    const Status written = WriteFileAtomically(root / name, name);
+    ASSERT_TRUE(written) << written.error().message;
+    EXPECT_TRUE(std::filesystem::is_symlink(root / name));
+    EXPECT_EQ(Slurp(root / name), name);
+  }
+  EXPECT_EQ(Slurp(root / "disk/file"), "link2");
+  EXPECT_EQ(Slurp(root / "disk/new"), "dangling");
+  std::filesystem::create_symlink("loop", root / "loop");
+  EXPECT_EQ(WriteFileAtomically(root / "loop", "x").error().code, ErrorCode::kCorruptData);
+}
+
+TEST(WriteFileAtomically, WritesIntoPipesAndDevices) {
+  const TemporaryDirectory root;
+  ASSERT_EQ(mkfifo((root / "pipe").c_str(), 0600), 0);
+  const int reader = open((root / "pipe").c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  std::filesystem::create_symlink("pipe", root / "link");
+  for (const char* name : {"pipe", "link"}) {
+    const Status written = WriteFileAtomically(root / name, "text");
+    ASSERT_TRUE(written) << written.error().message;
+    char text[9] = {};
+    EXPECT_EQ(read(reader, text, sizeof(text)), 4);
+    EXPECT_STREQ(text, "text");
+  }
+  close(reader);
+  std::filesystem::create_symlink("/dev/null", root / "null");
+  EXPECT_TRUE(WriteFileAtomically(root / "null", "text"));
+  EXPECT_TRUE(std::filesystem::is_symlink(root / "null"));
+  EXPECT_TRUE(std::filesystem::is_fifo(root / "pipe"));
+  EXPECT_EQ(root.Names().size(), 3u);
 }
 
 TEST(ParentDirectory, IsWhatHoldsTheLastName) {

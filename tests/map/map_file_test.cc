@@ -435,6 +435,17 @@ TEST_F(MapFileTest, LeavesAnExistingMapAloneUnlessToldToReplaceIt) {
   EXPECT_THAT(root_.Names(), ElementsAre("map"));
 }
 
+TEST_F(MapFileTest, OnlyItsOwnFilesBelongToAMap) {
+  ASSERT_TRUE(WriteMap(LineMap{}, path_));
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(path_)) {
+    const std::string name = entry.path().lexically_relative(path_).string();
+    EXPECT_TRUE(IsMapFile(entry.is_directory() ? name + "/" : name)) << name;
+  }
+  for (const char* name : {"", "README.txt", "tiles", "tiles/a.txt", "tiles/a/b.plt", "a.plt"}) {
+    EXPECT_FALSE(IsMapFile(name)) << name;
+  }
+}
+
 TEST_F(MapFileTest, ReplacesAnEmptyDirectoryOnlyWhenToldTo) {
   std::filesystem::create_directory(path_);
   EXPECT_FALSE(WriteMap(LineMap{}, path_));

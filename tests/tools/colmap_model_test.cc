@@ -178,9 +178,33 @@ TEST(ColmapModel, ErrorsNameTheirPlace) {
   expect(camera, "1 2 0 0 0 0 0 0 1 a.png\n\n", "images.txt:1", "norm of 2");
   expect(camera, "1 1 0 0 0 0 0 0 1\n\n", "images.txt:1", "no name");
   expect(camera, "x 1 0 0 0 0 0 0 1 a.png\n\n", "images.txt:1", "no image");
-  expect(camera, "1 1 0 0 0 0 0 0 1 a.png", "images.txt:1", "observations of image 1");
+  expect(camera, "1 1 0 0 0 2e7 0 0 1 a.png\n\n", "images.txt:1", "image 1 lies more than 1e7 m");
   expect(camera, image + "1 1 0 0 0 0 0 0 1 b.png\n\n", "images.txt", "image 1 twice");
   expect(camera, image + "2 1 0 0 0 0 0 0 1 a.png\n\n", "images.txt", "a.png twice");
+}
+
+TEST(ColmapModel, NoImageIsTakenForObservations) {
+  const std::string camera = "1 PINHOLE 640 480 500 500 320 240\n";
+  const std::string a = "1 1 0 0 0 0 0 0 1 a.png\n", b = "2 1 0 0 0 0 0 0 1 b.png\n";
+  const std::string number = "3 1 0 0 0 0 0 0 1 10\n";  // a name of digits
+  const auto parse = [&](const std::string& images) {
+    return ParseColmapText(camera, images, "cameras.txt", "images.txt");
+  };
+  for (const std::string& images : {a + b, "# two\n" + a + number, a + "0.5 1.5 7 1 2\n" + b + "\n",
+                                    a + "0.5 1.5 7.5\n" + b + "\n", a + "0.5 nan 7\n" + b + "\n"}) {
+    const auto model = parse(images);
+    ASSERT_FALSE(model) << images;
+    EXPECT_EQ(model.error().code, ErrorCode::kCorruptData);
+    const std::string line = images.starts_with('#') ? "images.txt:3" : "images.txt:2";
+    EXPECT_THAT(model.error().message, AllOf(HasSubstr(line), HasSubstr("of image 1")));
+  }
+  // Editors and scripts drop the last blank line.
+  for (const std::string& images :
+       {a + "\n" + b, a + " \t\n" + b + "\n\n\n", a + "0.5 1.5 7 2 -3.25 -1\n" + b}) {
+    const auto model = parse(images);
+    ASSERT_TRUE(model) << model.error().message;
+    EXPECT_EQ(model->images.size(), 2u) << images;
+  }
 }
 
 TEST(ColmapModel, EveryTruncationOfTheBinaryFormIsRefused) {

@@ -1,11 +1,12 @@
 // Readers of data sets: timestamps, trajectories, sequences, images, annotations.
 #include <filesystem>
-#include <limits>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/tools/temporary_directory.h"
@@ -39,15 +40,16 @@ TEST(Timestamp, ReadsPlainDecimals) {
 }
 
 TEST(Timestamp, RefusesWhatIsNotExact) {
-  for (const char* text : {"", "-", ".5", "1e9", "nan", "1.0x", "1.2.3", "0.0000000001",
-                           "9223372037", "99999999999999999999"}) {
+  for (const char* text :
+       {"", "-", ".5", "1e9", "nan", "1.0x", "1.2.3", "0.0000000001", "9000000000.000000001",
+        "-9000000001", "9223372036", "99999999999999999999"}) {
     EXPECT_FALSE(ParseTimestamp(text)) << text;
   }
 }
 
 TEST(Timestamp, FormatIsTheInverse) {
   for (const int64_t ns : {int64_t{0}, int64_t{-1}, int64_t{66'667'000}, int64_t{-2'500'000'000},
-                           std::numeric_limits<int64_t>::max()}) {
+                           int64_t{-9'000'000'000'000'000'000}}) {
     EXPECT_EQ(*ParseTimestamp(FormatTimestamp(ns)), ns);
   }
   EXPECT_EQ(FormatTimestamp(66'667'000), "0.066667");
@@ -108,6 +110,8 @@ TEST(TumTrajectory, NamesFileLineAndValueOfWhatIsWrong) {
                {"2 0 0 0 0 0 0", "7 fields"},
                {"2 0 0 0 0 0 0 1 1", "9 fields"},
                {"2 0 x 0 0 0 0 1", "\"x\" is not a number"},
+               {"2 0 0 1e8 0 0 0 1", "more than 1e7 m from the origin"},
+               {"9000000001 0 0 0 0 0 0 1", "\"9000000001\" is beyond 9e9 s"},
                {"2 0 0 0 0 0 0 0.9", "norm is 0.9"},
                {"2 0 0 0 0 0 0 0", "norm is 0.0"},
                {"2s 0 0 0 0 0 0 1", "\"2s\" is not a timestamp"},
@@ -157,6 +161,16 @@ TEST(NearestPose, TakesTheEarlierAtATieAndKeepsTheTolerance) {
   EXPECT_EQ(NearestPose(trajectory, 16, 5), nullptr);
 }
 
+TEST(NearestPose, TimestampsMayBeAsFarApartAsTheyCan) {
+  constexpr int64_t kFar = 9'000'000'000'000'000'000;
+  const Trajectory trajectory{{-kFar, {}}, {kFar, {}}};
+  EXPECT_EQ(NearestPose(trajectory, 0, 5), nullptr);
+  EXPECT_EQ(NearestPose(trajectory, kFar - 1, 5)->timestamp_ns, kFar);
+  EXPECT_EQ(NearestPose(trajectory, kFar, 5)->timestamp_ns, kFar);
+  EXPECT_EQ(NearestPose(trajectory, -kFar, 5)->timestamp_ns, -kFar);
+  EXPECT_FALSE(PoseAt(trajectory, kFar - 1'000'000));
+}
+
 class Sequence : public ::testing::Test {
  protected:
   Sequence() {
@@ -196,12 +210,33 @@ TEST_F(Sequence, CameraErrorsNameTheMember) {
       {R"({"width": 4, "height": 2.5, "fx": 1, "fy": 1, "cx": 0, "cy": 0})", "\"height\" is 2.5"},
       {R"({"width": 4, "height": 2, "fx": 0, "fy": 1, "cx": 0, "cy": 0})", "is 0"},
       {R"({"width": 4, "height": 2, "fx": 1, "fy": 1, "cx": 0, "cy": 0})", "\"depth_scale\""},
+      {R"({"width": 4, "height": 2, "fx": 1, "fy": 1, "cx": 0, "cy": 0, "depth_scale": 1e-4})",
+       "\"depth_scale\" is 0.0001, want 1e-3 to 1e6"},
+      {R"({"width": 4, "height": 2, "fx": 1, "fy": 1, "cx": 0, "cy": 0, "depth_scale": 1e7})",
+       "\"depth_scale\" is 10000000.0, want"},
       {R"({"model": "FISHEYE"})", "\"FISHEYE\""}};
   for (const auto& c : cases) {
     dir_.Write("camera.json", c.json);
     const Result<TumSequence> sequence = ReadTumSequence(dir_.path());
     ASSERT_FALSE(sequence) << c.json;
     EXPECT_THAT(sequence.error().message, HasSubstr(c.message)) << c.json;
+  }
+}
+
+/// Many levels of nesting: what recurses over them exhausts the stack.
+std::string DeepArray() { return std::string(200'000, '[') + std::string(200'000, ']'); }
+
+TEST_F(Sequence, NestedAndLongMembersAreRefusedInAShortMessage) {
+  for (const char* member : {"width", "fx", "model", "distortion_coefficients", "depth_scale"}) {
+    for (const std::string& value : {DeepArray(), "\"" + std::string(5000, 'x') + "\""}) {
+      const auto camera =
+          ParseCameraFile("{\"" + std::string(member) + "\": " + value +
+                              R"(, "width": 4, "height": 2, "fx": 1, "fy": 1, "cx": 0, "cy": 0})",
+                          "camera.json", true);
+      ASSERT_FALSE(camera) << member;
+      EXPECT_LT(camera.error().message.size(), 240u) << member;
+      EXPECT_THAT(camera.error().message, HasSubstr("camera.json: "));
+    }
   }
 }
 
@@ -342,6 +377,39 @@ TEST(ImageFile, TruncatedMissingAndEmptyFilesAreErrors) {
             ErrorCode::kCorruptData);
 }
 
+TEST(ImageFile, AnImageThatIsCutOffAnywhereIsRefused) {
+  const TemporaryDirectory dir;
+  cv::Mat noise(48, 64, CV_8UC3);
+  cv::randu(noise, 0, 255);
+  const struct {
+    const char* name;
+    std::vector<int> parameters;
+  } forms[] = {{"a.jpg", {}},
+               {"progressive.jpg", {cv::IMWRITE_JPEG_PROGRESSIVE, 1}},
+               {"restarts.jpg", {cv::IMWRITE_JPEG_RST_INTERVAL, 4}},
+               {"a.png", {}}};
+  for (const auto& form : forms) {
+    cv::imwrite(dir / form.name, noise, form.parameters);
+    const std::string bytes = testing::ReadAll(dir / form.name);
+    EXPECT_TRUE(ReadColorImage(dir / form.name)) << form.name;
+    // Some cameras pad their files or append further data.
+    EXPECT_TRUE(ReadColorImage(dir.Write("padded", bytes + std::string(9, '\0')))) << form.name;
+    EXPECT_TRUE(ReadColorImage(dir.Write("longer", bytes + "trailer"))) << form.name;
+    for (const double share : {0.3, 0.5, 0.7, 0.9, 0.99}) {
+      const auto size = static_cast<size_t>(share * static_cast<double>(bytes.size()));
+      for (const std::string& padding : {std::string(), std::string(99, '\0')}) {
+        const auto cut = ReadColorImage(dir.Write("cut", bytes.substr(0, size) + padding));
+        ASSERT_FALSE(cut) << form.name << ' ' << share;
+        EXPECT_EQ(cut.error().code, ErrorCode::kCorruptData);
+      }
+    }
+  }
+  const std::string bytes = testing::ReadAll(dir / "a.jpg");
+  EXPECT_THAT(
+      ReadColorImage(dir.Write("cut.jpg", bytes.substr(0, bytes.size() - 1))).error().message,
+      HasSubstr("cut.jpg: ends before its image is complete"));
+}
+
 TEST(LineAnnotations, AreRead) {
   const TemporaryDirectory dir;
   dir.Write("annotations.json",
@@ -366,6 +434,29 @@ TEST(LineAnnotations, RefuseBrokenEntries) {
     dir.Write("annotations.json", json);
     EXPECT_EQ(ReadLineAnnotations(dir.path()).error().code, ErrorCode::kCorruptData) << json;
   }
+}
+
+TEST(LineAnnotations, NestedFilesAreRefused) {
+  const TemporaryDirectory dir;
+  const std::string deep = DeepArray();
+  for (const std::string& json :
+       {deep, R"([{"filename": "a", "file": "a", "lines": [], "scores": )" + deep + "}]"}) {
+    dir.Write("annotations.json", json);
+    EXPECT_THAT(ReadLineAnnotations(dir.path()).error().message, HasSubstr("too deeply"));
+    EXPECT_THAT(ReadDetections(dir / "annotations.json", {{"a", 9, 9, {}}}).error().message,
+                HasSubstr("too deeply"));
+  }
+}
+
+TEST(Detections, OfOneFileTwiceAreRefused) {
+  const TemporaryDirectory dir;
+  const std::string path =
+      dir.Write("found.json", R"([{"file": "x/a.jpg", "lines": [], "scores": []},
+                                  {"file": "y/a.jpg", "lines": [], "scores": []}])");
+  const auto read = ReadDetections(path, {{"a.jpg", 9, 9, {}}});
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::kCorruptData);
+  EXPECT_THAT(read.error().message, HasSubstr("image 1: want every file once, a.jpg"));
 }
 
 TEST(Detections, AreReadInTheImagesOrder) {

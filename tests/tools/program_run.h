@@ -16,9 +16,10 @@ struct ProgramRun {
 };
 
 /// `arguments` as typed in a shell; paths must not need quoting.
-inline ProgramRun RunPlumbline(const std::string& arguments) {
+/// @param runner  A command that runs the program, "timeout 1".
+inline ProgramRun RunPlumbline(const std::string& arguments, const std::string& runner = "") {
   const TemporaryDirectory streams;
-  const std::string command = std::string(PLUMBLINE_PROGRAM) + " " + arguments + " >" +
+  const std::string command = runner + " " + PLUMBLINE_PROGRAM + " " + arguments + " >" +
                               (streams / "out") + " 2>" + (streams / "err") + " </dev/null";
   const int status = std::system(command.c_str());
   ProgramRun run;

@@ -1,5 +1,6 @@
 // The program from the command line: what it prints, which exit codes it has, how it fails.
 #include <cmath>
+#include <filesystem>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -74,6 +75,47 @@ TEST(Program, WrongOptionsAreWrongUsage) {
     EXPECT_THAT(run.out, IsEmpty()) << arguments;
     EXPECT_THAT(run.err, HasSubstr("plumbline: ")) << arguments;
   }
+}
+
+TEST(Program, UnknownCommandsAreNamed) {
+  for (const auto& [arguments, message] :
+       {std::pair("frobnicate", "plumbline: no command 'frobnicate'"),
+        std::pair("frobnicate --json", "plumbline: no command 'frobnicate'"),
+        std::pair("map frobnicate x", "plumbline: map: no command 'frobnicate'"),
+        std::pair("map", "subcommand")}) {
+    const ProgramRun run = RunPlumbline(arguments);
+    EXPECT_EQ(run.exit_code, 64) << arguments;
+    EXPECT_THAT(run.err, HasSubstr(message));
+  }
+}
+
+TEST(Program, NumbersWithoutAValueAreWrongUsage) {
+  const std::string replay =
+      "replay --sequence s --frames f --priors p --map m --out o --overlay-brightness ";
+  for (const std::string& arguments :
+       {replay + "nan", replay + "-nan", replay + "inf", replay + "1.5",
+        replay + "1 --gravity-sigma nan", std::string("bench refine --budget-ms nan"),
+        std::string("bench refine --warm-up 1000001"), std::string("detect x --min-length nan"),
+        std::string("detect x --structural-nms nan"), std::string("detect x --score-threshold nan"),
+        std::string("synth --out /nowhere/x --sweep nan")}) {
+    const ProgramRun run = RunPlumbline(arguments);
+    EXPECT_EQ(run.exit_code, 64) << arguments << ": " << run.err;
+  }
+  EXPECT_EQ(RunPlumbline(replay + "1 --gravity-sigma 57").exit_code, 66);
+}
+
+TEST(Program, LongWorkCanBeInterrupted) {
+  const TemporaryDirectory dir;
+  for (const std::string& arguments :
+       {"synth --frames 100000 --width 64 --height 64 --samples 1 --out " + (dir / "room"),
+        std::string("bench refine --lines 2000 --num-frames 100000 --limit 100000"),
+        std::string("bench refine --lines 2000 --num-frames 1 --repeat 1 --warm-up 1000000")}) {
+    const ProgramRun run = RunPlumbline(arguments, "timeout --preserve-status -s INT 0.5");
+    EXPECT_EQ(run.exit_code, 130) << arguments << ": " << run.err;
+    EXPECT_THAT(run.out, IsEmpty());
+    EXPECT_THAT(run.err, HasSubstr("interrupted"));
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(dir.path()));
 }
 
 TEST(Program, VersionIsJson) {
@@ -164,6 +206,13 @@ TEST(Program, EvalLinesScoresAnAnnotatedFolder) {
   EXPECT_EQ(report["images"], 1);
   EXPECT_DOUBLE_EQ(report["sAP10"].get<double>(), 100.0);
   EXPECT_GT(report["ms_per_image"].get<double>(), 0.0);
+  const std::string curve = "eval lines --model lsd --data " + dir.path() + " --json --curve ";
+  const ProgramRun lost = RunPlumbline(curve + (dir / "no/curve.csv"));
+  EXPECT_EQ(lost.exit_code, 73);
+  EXPECT_EQ(json::parse(lost.out)["sAP10"], report["sAP10"]);
+  EXPECT_THAT(lost.err, HasSubstr("no/curve.csv"));
+  EXPECT_EQ(RunPlumbline(curve + (dir / "curve.csv")).exit_code, 0);
+  EXPECT_THAT(testing::ReadAll(dir / "curve.csv"), HasSubstr("threshold,precision"));
   dir.Write("annotations.json",
             R"([{"filename": "a.png", "width": 161, "height": 120, "lines": []}])");
   const ProgramRun wrong = RunPlumbline("eval lines --model lsd --data " + dir.path() + " --json");

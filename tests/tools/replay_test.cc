@@ -324,6 +324,16 @@ TEST_F(Replay, RefinesEveryFrameAndSaysHowWell) {
   EXPECT_EQ(num_statuses, kNumQueries);
 }
 
+TEST_F(Replay, PathsNeedNotBeUtf8) {
+  const std::string map = dir_ / "m\xE4p", out = dir_ / "r\xFCn";
+  fs::copy(Map(), map, fs::copy_options::recursive);
+  const ProgramRun run =
+      RunPlumbline(ReplayArguments(Priors(), map) + " --overlays 0 --out " + out);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(ReadAll(out + "/summary.json"), run.out);
+  EXPECT_EQ(json::parse(run.out)["frames"], kNumQueries);
+}
+
 TEST_F(Replay, EqualInputsGiveEqualBytes) {
   for (const char* name : {"a", "b"}) {
     const ProgramRun run =
@@ -389,6 +399,20 @@ TEST_F(Replay, BadPriorSizesAreWrongUsage) {
   for (const char* size : {"10", "10,", "0,1", "10,-2", "nan,1", "1,2,3"}) {
     ExpectFailure(ReplayArguments(Priors(), Map()) + " --prior-size " + size, 64, "--prior-size");
   }
+  for (const auto& [size, message] :
+       {std::pair("1e9,2", "1e+09 cm is outside 1e-07 to 100000"),
+        std::pair("10,200", "200 deg is outside 1e-07 to 183"),
+        std::pair("1e-12,1e-12", "1e-12 cm is outside"), std::pair("1,1e-12", "1e-12 deg is")}) {
+    ExpectFailure(ReplayArguments(Priors(), Map()) + " --prior-size " + size, 64, message);
+  }
+  const std::string replay = ReplayArguments(Priors(), Map());
+  for (const char* size : {"100000,183", "1e-7,1e-7"}) {
+    EXPECT_EQ(
+        RunPlumbline(replay + " --overlays 0 --out " + (dir_ / "run") + " --prior-size " + size)
+            .exit_code,
+        0)
+        << size;
+  }
 }
 
 TEST_F(Replay, TruncatedAndFlippedMapsAreBadData) {
@@ -421,6 +445,32 @@ TEST_F(Replay, OtherPeoplesDirectoriesAreNotReplaced) {
   EXPECT_THAT(Entries(dir_.path()), ::testing::ElementsAre("run"));
 }
 
+TEST_F(Replay, FilesBesideAnEarlierResultAreNotRemoved) {
+  const std::string arguments = ReplayArguments(Priors(), Map()) + " --overlays 2 --out ";
+  const std::string run = dir_ / "run", map = dir_ / "map", room = dir_ / "room";
+  const std::string synth = "synth --frames 2 --width 64 --height 64 --samples 1 --out " + room;
+  fs::copy(Map(), map, fs::copy_options::recursive);
+  for (int k = 0; k < 2; ++k) {  // the second time they replace themselves
+    ASSERT_EQ(RunPlumbline(arguments + run).exit_code, 0);
+    ASSERT_EQ(RunPlumbline(synth + (k == 0 ? "" : " --png")).exit_code, 0);
+  }
+  EXPECT_TRUE(fs::exists(room + "/rgb/000001.png"));
+  EXPECT_FALSE(fs::exists(room + "/rgb/000001.jpg"));
+  const struct {
+    std::string arguments, foreign;
+  } cases[] = {{arguments + run, "run/overlay-best.png"},
+               {synth, "room/rgb/mine.jpg"},
+               // With a sequence that is missing: refused before anything is read.
+               {BuildArguments(dir_ / "none") + " --out " + map, "map/README.txt"}};
+  for (const auto& c : cases) {
+    dir_.Write(c.foreign, "years of work");
+    const ProgramRun refused = RunPlumbline(c.arguments);
+    EXPECT_EQ(refused.exit_code, 73) << c.foreign << ": " << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(c.foreign.substr(c.foreign.find('/') + 1)));
+    EXPECT_EQ(ReadAll(dir_ / c.foreign), "years of work");
+  }
+}
+
 TEST_F(Replay, OutputsNeedAnExistingParent) {
   const ProgramRun run =
       RunPlumbline(ReplayArguments(Priors(), Map()) + " --out " + (dir_ / "no/run"));
@@ -437,6 +487,25 @@ TEST_F(Replay, AMissingDepthImageStopsTheBuildAndLeavesNoMap) {
   EXPECT_THAT(run.out, IsEmpty());
   EXPECT_THAT(run.err, HasSubstr("depth/000003.png"));
   EXPECT_THAT(Entries(dir_.path()), IsEmpty());
+}
+
+TEST_F(Replay, AMapWithoutLinesReplacesNone) {
+  const TemporaryDirectory copy;
+  fs::copy(room_->path(), copy / "room", fs::copy_options::recursive);
+  json camera = json::parse(ReadAll(copy / "room/camera.json"));
+  camera["depth_scale"] = 1e-3;  // everything is farther off than depth reaches
+  copy.Write("room/camera.json", camera.dump());
+  fs::copy(Map(), dir_ / "map", fs::copy_options::recursive);
+  const std::string build = BuildArguments(copy / "room") + " --depth sensor --out ";
+  const ProgramRun run = RunPlumbline(build + (dir_ / "map"));
+  EXPECT_EQ(run.exit_code, 65) << run.err;
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(run.err, ::testing::ContainsRegex("room: none of the [0-9]+ segments got a depth"));
+  for (const auto& entry : fs::recursive_directory_iterator(Map())) {
+    const fs::path name = fs::relative(entry.path(), Map());
+    if (!entry.is_regular_file()) continue;
+    EXPECT_EQ(ReadAll(dir_ / "map/" + name.string()), ReadAll(entry.path().string())) << name;
+  }
 }
 
 TEST_F(Replay, ABrokenImageStopsTheReplayHalfWayAndLeavesNoRun) {
@@ -477,6 +546,10 @@ TEST_F(Replay, EvalNeedsARunAndMatchingTruth) {
   const ProgramRun corrupt = RunPlumbline("eval trajectory --run " + (dir_ / "run") + rest);
   EXPECT_EQ(corrupt.exit_code, 65);
   EXPECT_THAT(corrupt.err, HasSubstr("frames.jsonl:1"));
+  dir_.Write("run/frames.jsonl", "{\"status\": \"REFINED\", \"covariance\": " +
+                                     std::string(20'000, '[') + std::string(20'000, ']') + "}\n");
+  const ProgramRun nested = RunPlumbline("eval trajectory --run " + (dir_ / "run") + rest);
+  EXPECT_EQ(nested.exit_code, 65);
   dir_.Write("run/frames.jsonl", "");
   const std::string truth = dir_.Write("truth.txt", "777 0 0 0 0 0 0 1\n");
   const ProgramRun apart = RunPlumbline("eval trajectory --run " + (dir_ / "run") + " --truth " +

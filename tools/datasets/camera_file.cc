@@ -8,12 +8,16 @@
 
 #include <nlohmann/json.hpp>
 
+#include "plumb/base/json_depth.h"
+#include "tools/datasets/text_file.h"
+
 namespace plumb::tools {
 namespace {
 
 using Json = nlohmann::json;
 
 constexpr int kMaxSidePx = 16384;
+constexpr double kMinDepthScale = 1e-3, kMaxDepthScale = 1e6;
 constexpr const char* kCoefficients = "distortion_coefficients";
 
 struct ModelName {
@@ -28,6 +32,8 @@ constexpr ModelName kModelNames[] = {{"PINHOLE", LensModel::kNone, 0},
                                      {"KANNALA_BRANDT", LensModel::kKannalaBrandt, 4},
                                      {"OPENCV_FISHEYE", LensModel::kKannalaBrandt, 4}};
 
+std::string Shown(const Json& value) { return Shortened(value.dump()); }
+
 /// Reads members and says which one is wrong.
 class MemberReader {
  public:
@@ -41,7 +47,7 @@ class MemberReader {
     if (!json_.contains(key)) return Corrupt(std::string("\"") + key + "\" is missing");
     const Json& value = json_[key];
     if (!value.is_number() || !std::isfinite(value.get<double>())) {
-      return Corrupt(std::string("\"") + key + "\" is " + value.dump() + ", no number");
+      return Corrupt(std::string("\"") + key + "\" is " + Shown(value) + ", no number");
     }
     *out = value.get<double>();
     return Ok();
@@ -51,7 +57,7 @@ class MemberReader {
     double value = 0.0;
     if (const Status read = Number(key, &value); !read) return read.error();
     if (!(value >= 1.0 && value <= kMaxSidePx && value == std::floor(value))) {
-      return Corrupt(std::string("\"") + key + "\" is " + json_[key].dump() + ", want 1 to 16384");
+      return Corrupt(std::string("\"") + key + "\" is " + Shown(json_[key]) + ", want 1 to 16384");
     }
     *out = static_cast<int>(value);
     return Ok();
@@ -67,7 +73,7 @@ class MemberReader {
         std::string known;
         for (const ModelName& entry : kModelNames) known += std::string(" ") + entry.name;
         return Error{ErrorCode::kUnsupported,
-                     path_ + ": \"model\" is " + name.dump() + ", known are" + known};
+                     path_ + ": \"model\" is " + Shown(name) + ", known are" + known};
       }
     }
     if (!json_.contains(kCoefficients)) {
@@ -77,13 +83,13 @@ class MemberReader {
     }
     const Json& values = json_[kCoefficients];
     const auto wrong = [&](const std::string& what) {
-      return Corrupt(std::string("\"") + kCoefficients + "\" is " + values.dump() + ": " + what);
+      return Corrupt(std::string("\"") + kCoefficients + "\" is " + Shown(values) + ": " + what);
     };
     if (!values.is_array()) return wrong("no array of numbers");
     std::vector<double> numbers;
     for (const Json& value : values) {
       if (!value.is_number() || !std::isfinite(value.get<double>())) {
-        return wrong(value.dump() + " is no number");
+        return wrong(Shown(value) + " is no number");
       }
       numbers.push_back(value.get<double>());
     }
@@ -109,8 +115,10 @@ class MemberReader {
 
 Result<CameraFile> ParseCameraFile(const std::string& text, const std::string& path,
                                    bool needs_depth_scale) {
-  const Json json = Json::parse(text, nullptr, false);
+  const bool shallow = IsShallowJson(text);
+  const Json json = shallow ? Json::parse(text, nullptr, false) : Json();
   const MemberReader reader(json, path);
+  if (!shallow) return reader.Corrupt("is nested too deeply");
   if (!json.is_object()) return reader.Corrupt("is no JSON object");
   CameraFile file;
   const Result<Lens> lens = reader.ReadLens();
@@ -132,9 +140,9 @@ Result<CameraFile> ParseCameraFile(const std::string& text, const std::string& p
   if (const Status read = reader.Number("depth_scale", &file.depth_scale); !read) {
     return read.error();
   }
-  if (!(file.depth_scale > 0.0)) {
-    return reader.Corrupt("\"depth_scale\" is " + json["depth_scale"].dump() +
-                          ", want a positive number");
+  if (!(file.depth_scale >= kMinDepthScale && file.depth_scale <= kMaxDepthScale)) {
+    return reader.Corrupt("\"depth_scale\" is " + Shown(json["depth_scale"]) +
+                          ", want 1e-3 to 1e6 units per metre");
   }
   return file;
 }

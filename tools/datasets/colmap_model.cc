@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "tools/datasets/text_file.h"
+#include "tools/datasets/trajectory.h"
 
 namespace plumb::tools {
 namespace {
@@ -133,6 +134,9 @@ Result<ColmapModel> Assemble(const RawCameras& cameras, std::vector<RawImage> im
     if (!rotation.coeffs().allFinite() || !raw.image.cam_from_world.translation.allFinite()) {
       return Corrupt(raw.place, image + " has a pose that is not finite");
     }
+    if (!(raw.image.cam_from_world.translation.norm() <= kMaxPoseDistanceM)) {
+      return Corrupt(raw.place, image + " lies more than 1e7 m from the origin");
+    }
     if (!(std::abs(rotation.norm() - 1.0) <= kUnitTolerance)) {
       return Corrupt(raw.place, image + " has a quaternion with a norm of " +
                                     std::to_string(rotation.norm()) + ", not 1");
@@ -239,6 +243,17 @@ Result<RawCameras> ParseTextCameras(std::string_view text, const std::string& pa
   return cameras;
 }
 
+/// "X Y POINT3D_ID" repeated, or blank. Anything else is the next image where the line is missing.
+bool IsObservations(std::string_view line) {
+  for (std::string_view x = TakeField(&line); !x.empty(); x = TakeField(&line)) {
+    if (!ParseNumber(x) || !ParseNumber(TakeField(&line)) ||
+        !ParseInteger<int64_t>(TakeField(&line))) {
+      return false;
+    }
+  }
+  return true;
+}
+
 Result<std::vector<RawImage>> ParseTextImages(std::string_view text, const std::string& path) {
   std::vector<RawImage> images;
   const std::vector<TextLine> lines = TextLines(text);
@@ -266,10 +281,11 @@ Result<std::vector<RawImage>> ParseTextImages(std::string_view text, const std::
     image.q_wxyz = {pose[0], pose[1], pose[2], pose[3]};
     image.image.cam_from_world.translation = {pose[4], pose[5], pose[6]};
     images.push_back(std::move(image));
-    ++i;  // the observations
-    if (i == lines.size()) {
-      return Corrupt(images.back().place,
-                     "ends before the line of observations of image " + std::to_string(*id));
+    ++i;  // the observations; the blank line of an image without any may lack at the file's end
+    if (i < lines.size() && !IsObservations(lines[i].text)) {
+      return Corrupt(PlaceOf(path, lines[i]), "is no line of observations of image " +
+                                                  std::to_string(*id) +
+                                                  ": want X Y POINT3D_ID .. or a blank line");
     }
   }
   return images;

@@ -1,7 +1,8 @@
 // Image and depth files, decoded by OpenCV.
 #include "tools/datasets/image_file.h"
 
-#include <vector>
+#include <cstdint>
+#include <string_view>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -10,9 +11,37 @@
 namespace plumb::tools {
 namespace {
 
+/// Whether a JPEG's image is there to its end, which libjpeg only warns about: what is missing
+/// comes out grey. What follows the image, as some cameras write it, is not looked at.
+bool IsCompleteJpeg(std::string_view bytes) {
+  constexpr char kMarker = '\xFF', kEnd = '\xD9', kScan = '\xDA';
+  // What has no length behind it: stuffed bytes and restarts, both within scans, and 0x01.
+  const auto is_restart = [](char code) { return code >= '\xD0' && code <= '\xD7'; };
+  bool in_scan = false;
+  for (size_t i = 2; i + 1 < bytes.size();) {
+    const char code = bytes[i + 1];
+    if (bytes[i] != kMarker || code == kMarker) {
+      ++i;
+    } else if (code == '\0' || code == '\x01' || is_restart(code)) {
+      i += 2;
+    } else if (code == kEnd) {
+      return in_scan;
+    } else {
+      if (i + 3 >= bytes.size()) return false;
+      in_scan = in_scan || code == kScan;
+      i += 2 + 256 * static_cast<size_t>(static_cast<uint8_t>(bytes[i + 2])) +
+           static_cast<uint8_t>(bytes[i + 3]);
+    }
+  }
+  return false;
+}
+
 Result<cv::Mat> Decode(const std::string& path, int flags) {
   const Result<std::string> bytes = ReadFile(path);
   if (!bytes) return bytes.error();
+  if (bytes->starts_with("\xFF\xD8") && !IsCompleteJpeg(*bytes)) {
+    return Error{ErrorCode::kCorruptData, path + ": ends before its image is complete"};
+  }
   cv::Mat image;
   if (!bytes->empty()) {
     try {

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "plumb/base/json_depth.h"
 #include "tools/datasets/text_file.h"
 
 namespace plumb::tools {
@@ -18,6 +19,9 @@ constexpr double kMaxCoordinatePx = 1 << 20;
 Result<nlohmann::json> ReadJsonArray(const std::string& path) {
   const Result<std::string> text = ReadFile(path);
   if (!text) return text.error();
+  if (!IsShallowJson(*text)) {
+    return Error{ErrorCode::kCorruptData, path + ": is nested too deeply"};
+  }
   nlohmann::json json = nlohmann::json::parse(*text, nullptr, false);
   if (!json.is_array() || json.empty()) {
     return Error{ErrorCode::kCorruptData, path + ": is no JSON array with at least one image"};
@@ -99,13 +103,16 @@ Result<std::vector<std::vector<Segment2>>> ReadDetections(
     if (!entry.contains("lines") || !ParseLines(entry["lines"], &segments)) {
       return corrupt("\"lines\": [[x1, y1, x2, y2], ..], in pixels");
     }
-    const nlohmann::json scores = entry.value("scores", nlohmann::json());
-    if (!scores.is_array() || scores.size() != segments.size() ||
-        !std::all_of(scores.begin(), scores.end(), [](const auto& v) { return v.is_number(); })) {
+    const auto scores = entry.find("scores");
+    if (scores == entry.end() || !scores->is_array() || scores->size() != segments.size() ||
+        !std::all_of(scores->begin(), scores->end(), [](const auto& v) { return v.is_number(); })) {
       return corrupt("\"scores\", one number a line");
     }
-    for (size_t k = 0; k < segments.size(); ++k) segments[k].score = scores[k].get<double>();
-    segments_of[FileName(entry["file"].get<std::string>())] = std::move(segments);
+    for (size_t k = 0; k < segments.size(); ++k) segments[k].score = (*scores)[k].get<double>();
+    const std::string name = FileName(entry["file"].get<std::string>());
+    if (!segments_of.emplace(name, std::move(segments)).second) {
+      return corrupt(("every file once, " + Shortened(name) + " is there before").c_str());
+    }
   }
   std::vector<std::vector<Segment2>> found;
   for (const AnnotatedImage& image : images) {

@@ -55,12 +55,20 @@ Result<double> ParseNumber(std::string_view field) {
   const char* const end = field.data() + field.size();
   const auto [parsed, code] = std::from_chars(field.data(), end, value);
   if (code != std::errc() || parsed != end) {
-    return Error{ErrorCode::kCorruptData, "\"" + std::string(field) + "\" is not a number"};
+    return Error{ErrorCode::kCorruptData, "\"" + Shortened(field) + "\" is not a number"};
   }
   if (!std::isfinite(value)) {
-    return Error{ErrorCode::kCorruptData, "\"" + std::string(field) + "\" is not finite"};
+    return Error{ErrorCode::kCorruptData, "\"" + Shortened(field) + "\" is not finite"};
   }
   return value;
+}
+
+std::string Shortened(std::string_view value) {
+  constexpr size_t kMaxBytes = 80;
+  if (value.size() <= kMaxBytes) return std::string(value);
+  size_t end = kMaxBytes;
+  while (end > 0 && (value[end] & '\xC0') == '\x80') --end;  // no part of a UTF-8 character
+  return std::string(value.substr(0, end)) + "...";
 }
 
 std::string Place(const std::string& path, const DataLine& line) {

@@ -26,6 +26,9 @@ std::vector<DataLine> DataLines(std::string_view text);
 /// @return kCorruptData naming the field.
 Result<double> ParseNumber(std::string_view field);
 
+/// `value` for a message: what is long ends in "..." after 80 bytes.
+std::string Shortened(std::string_view value);
+
 /// "FILE:LINE", the way errors name a place in a text file.
 std::string Place(const std::string& path, const DataLine& line);
 

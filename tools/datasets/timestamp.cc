@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <limits>
+
+#include "tools/datasets/text_file.h"
 
 namespace plumb::tools {
 namespace {
 
 constexpr uint64_t kNsPerSecond = 1'000'000'000;
+constexpr uint64_t kMaxSeconds = 9'000'000'000;
 constexpr size_t kDecimals = 9;
 
 bool AllDigits(std::string_view text) {
@@ -16,7 +18,7 @@ bool AllDigits(std::string_view text) {
 }
 
 Error Refused(std::string_view text, const char* reason) {
-  return Error{ErrorCode::kCorruptData, "\"" + std::string(text) + "\" " + reason};
+  return Error{ErrorCode::kCorruptData, "\"" + Shortened(text) + "\" " + reason};
 }
 
 }  // namespace
@@ -34,11 +36,10 @@ Result<int64_t> ParseTimestamp(std::string_view seconds) {
   while (fraction.size() > kDecimals && fraction.back() == '0') fraction.remove_suffix(1);
   if (fraction.size() > kDecimals) return Refused(seconds, "is finer than nanoseconds");
 
-  constexpr uint64_t kMax = std::numeric_limits<int64_t>::max();
   uint64_t value = 0;
   for (const char c : whole) {
     value = 10 * value + static_cast<uint64_t>(c - '0');
-    if (value > kMax / kNsPerSecond) return Refused(seconds, "is too large for nanoseconds");
+    if (value > kMaxSeconds) return Refused(seconds, "is beyond 9e9 s");
   }
   uint64_t nanoseconds = 0;
   for (size_t i = 0; i < kDecimals; ++i) {
@@ -46,7 +47,7 @@ Result<int64_t> ParseTimestamp(std::string_view seconds) {
         10 * nanoseconds + (i < fraction.size() ? static_cast<uint64_t>(fraction[i] - '0') : 0);
   }
   value = value * kNsPerSecond + nanoseconds;
-  if (value > kMax) return Refused(seconds, "is too large for nanoseconds");
+  if (value > kMaxSeconds * kNsPerSecond) return Refused(seconds, "is beyond 9e9 s");
   return negative ? -static_cast<int64_t>(value) : static_cast<int64_t>(value);
 }
 

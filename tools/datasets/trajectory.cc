@@ -42,6 +42,9 @@ Result<StampedPose> ParsePose(const std::string& path, const DataLine& line) {
                    "the quaternion's norm is " + std::to_string(rotation.norm()) + ", not 1");
   }
   const Rigid3 world_from_cam{rotation.normalized(), {v[0], v[1], v[2]}};
+  if (!(world_from_cam.translation.norm() <= kMaxPoseDistanceM)) {
+    return Corrupt(path, line, "the camera lies more than 1e7 m from the origin");
+  }
   return StampedPose{*timestamp_ns, world_from_cam.Inverse()};
 }
 
@@ -107,8 +110,9 @@ std::optional<Rigid3> PoseAt(std::span<const StampedPose> trajectory, int64_t ti
   if (after == trajectory.begin() || after == trajectory.end()) return std::nullopt;
   const StampedPose& b = *after;
   const StampedPose& a = *std::prev(after);
+  // Timestamps far apart have no difference that fits.
+  if (a.timestamp_ns < b.timestamp_ns - kMaxGapNs) return std::nullopt;
   const int64_t gap_ns = b.timestamp_ns - a.timestamp_ns;
-  if (gap_ns > kMaxGapNs) return std::nullopt;
   const double share =
       static_cast<double>(timestamp_ns - a.timestamp_ns) / static_cast<double>(gap_ns);
   // The camera's centre moves on a line, hence in the world's frame.
@@ -125,11 +129,12 @@ const StampedPose* NearestPose(std::span<const StampedPose> trajectory, int64_t 
   const auto after = LowerBound(trajectory, timestamp_ns);
   const StampedPose* nearest = nullptr;
   int64_t best_ns = tolerance_ns;
-  if (after != trajectory.begin() && timestamp_ns - std::prev(after)->timestamp_ns <= best_ns) {
+  // No difference of any two timestamps is taken: it need not fit.
+  if (after != trajectory.begin() && std::prev(after)->timestamp_ns >= timestamp_ns - best_ns) {
     nearest = &*std::prev(after);
     best_ns = timestamp_ns - nearest->timestamp_ns - 1;  // The later one must be strictly nearer.
   }
-  if (after != trajectory.end() && after->timestamp_ns - timestamp_ns <= best_ns) nearest = &*after;
+  if (after != trajectory.end() && after->timestamp_ns <= timestamp_ns + best_ns) nearest = &*after;
   return nearest;
 }
 

@@ -12,6 +12,9 @@
 
 namespace plumb::tools {
 
+/// From the origin; what maps can hold. Farther off, poses are taken for broken.
+inline constexpr double kMaxPoseDistanceM = 1e7;
+
 /// The file's camera-to-world becomes cam_from_world here, as everywhere in memory.
 struct StampedPose {
   int64_t timestamp_ns = 0;
@@ -23,8 +26,9 @@ using Trajectory = std::vector<StampedPose>;
 
 /// Reads a TUM trajectory; lines may come in any order.
 /// @return kNotFound; kCorruptData naming file, line and value for a wrong number of fields, a
-///         number that is not finite, a quaternion whose norm is off by more than 1e-3, a timestamp
-///         that occurs twice, or a file without any pose.
+///         number that is not finite, a camera more than kMaxPoseDistanceM from the origin, a
+///         quaternion whose norm is off by more than 1e-3, a timestamp that occurs twice, or a file
+///         without any pose.
 Result<Trajectory> ReadTumTrajectory(const std::string& path);
 
 /// Inverse of ReadTumTrajectory, 17 significant digits a number.

@@ -66,11 +66,12 @@ std::optional<size_t> Nearest(const std::vector<Item>& items, int64_t timestamp_
                        [](const Item& item, int64_t value) { return item.timestamp_ns < value; });
   std::optional<size_t> nearest;
   int64_t best_ns = tolerance_ns;
-  if (after != items.begin() && timestamp_ns - std::prev(after)->timestamp_ns <= best_ns) {
+  // No difference of any two timestamps is taken: it need not fit.
+  if (after != items.begin() && std::prev(after)->timestamp_ns >= timestamp_ns - best_ns) {
     nearest = static_cast<size_t>(std::prev(after) - items.begin());
     best_ns = timestamp_ns - std::prev(after)->timestamp_ns - 1;
   }
-  if (after != items.end() && after->timestamp_ns - timestamp_ns <= best_ns) {
+  if (after != items.end() && after->timestamp_ns <= timestamp_ns + best_ns) {
     nearest = static_cast<size_t>(after - items.begin());
   }
   return nearest;

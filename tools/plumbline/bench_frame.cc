@@ -9,6 +9,7 @@
 #include "tools/plumbline/console.h"
 #include "tools/plumbline/frame_record.h"
 #include "tools/plumbline/frame_run.h"
+#include "tools/plumbline/interrupt.h"
 
 namespace plumb::tools {
 namespace {
@@ -26,6 +27,7 @@ struct BenchFrameOptions {
 Outcome LoadImages(FrameRun* run) {
   ProgressBar progress("load", run->frames.size());
   for (const SequenceFrame& frame : run->frames) {
+    if (Outcome interrupted = CheckInterrupt()) return interrupted;
     Result<cv::Mat> image = ReadColorImage(frame.color_path);
     if (!image) return FailureFrom(image.error());
     run->images.push_back(*std::move(image));

@@ -12,6 +12,7 @@
 #include "tools/metrics/percentile.h"
 #include "tools/metrics/trajectory_error.h"
 #include "tools/plumbline/commands.h"
+#include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 #include "tools/plumbline/prior_files.h"
 #include "tools/plumbline/refine_queries.h"
@@ -74,6 +75,7 @@ Outcome Measure(const BenchRefineOptions& options, const MapIndex& index,
   const bool is_tracked = is_stream && !options.run.map.empty();
   RefineResult result, run_result;
   for (size_t i = 0; i < input.queries.size(); ++i) {
+    if (Outcome interrupted = CheckInterrupt()) return interrupted;
     const RefineQuery& query = input.queries[i];
     RefineInput frame;
     frame.camera = input.camera;
@@ -191,7 +193,8 @@ Outcome RunBenchRefine(const BenchRefineOptions& options) {
       return failed;
     }
     city.num_frames = std::min(city.num_frames, options.limit) + options.warm_up;
-    const RefineQueries queries = MakeCityQueries(city, &map);
+    RefineQueries queries;
+    if (Outcome failed = MakeCityQueries(city, &map, &queries)) return failed;
     const MapIndex index(map);
     if (Outcome failed = Measure(options, index, queries, &measured)) return failed;
     return Report(options, map, measured);
@@ -246,6 +249,7 @@ void AddBenchRefine(CLI::App& bench, PendingRun& pending) {
             ->check(CLI::Range(size_t{1}, size_t{100'000}))
             ->capture_default_str();
         command.add_option("--warm-up", options.warm_up, "First frames that are not timed")
+            ->check(CLI::Range(size_t{0}, size_t{1'000'000}))
             ->capture_default_str();
         command
             .add_option("--repeat", options.repeat,
@@ -253,7 +257,7 @@ void AddBenchRefine(CLI::App& bench, PendingRun& pending) {
             ->check(CLI::Range(1, 1000))
             ->capture_default_str();
         command.add_option("--budget-ms", options.budget_ms, "Time budget of a frame; 0: none")
-            ->check(CLI::Range(0.0, 1e6))
+            ->check(FiniteRange(0.0, 1e6))
             ->capture_default_str();
         command.add_flag("--json", options.json, "Print {ms: {STAGE: {mean, p50, ..}}, error, ..}");
         command.footer(

@@ -12,6 +12,7 @@
 #include "plumb/features/detector_factory.h"
 #include "plumb/features/vlse_detector.h"
 #include "tools/plumbline/console.h"
+#include "tools/plumbline/program.h"
 
 namespace plumb::tools {
 namespace {
@@ -63,7 +64,7 @@ void BindDetectorOptions(CLI::App& command, DetectorOptions& options) {
   command
       .add_option("--score-threshold", options.score_threshold,
                   "Drop segments with a lower score (default: as the model says)")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(FiniteRange(0.0, 1.0));
   command
       .add_option("--top-k", options.max_lines,
                   "At most so many segments, the best (default: as the model says; of each tile)")
@@ -71,13 +72,13 @@ void BindDetectorOptions(CLI::App& command, DetectorOptions& options) {
   command
       .add_option("--min-length", options.min_length_px,
                   "Drop segments shorter than so many pixels")
-      ->check(CLI::Range(0.0, 1e5))
+      ->check(FiniteRange(0.0, 1e5))
       ->capture_default_str();
   command
       .add_option("--structural-nms", options.structural_nms,
                   "Drop segments whose ends are near a better one's: squared distances in an image "
                   "of 128 x 128, 2 is usual, 0 is off")
-      ->check(CLI::Range(0.0, 1e5))
+      ->check(FiniteRange(0.0, 1e5))
       ->capture_default_str();
   command
       .add_option("--tiles", options.tiles,

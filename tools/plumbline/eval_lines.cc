@@ -86,22 +86,14 @@ Outcome WriteCurve(const std::string& path, const std::vector<LineEvaluation>& i
     text += line;
   }
   const Status written = WriteFileAtomically(path, text);
-  return written ? Outcome() : FailureFrom(written.error());
+  if (written) return std::nullopt;
+  const bool io = written.error().code == ErrorCode::kIoError;
+  return Failure{io ? kExitIo : kExitCannotCreate,
+                 "--curve " + path + ": " + written.error().message};
 }
 
-Outcome RunEvalLines(const EvalLinesOptions& options) {
-  const Result<std::vector<AnnotatedImage>> annotated =
-      ReadLineAnnotations(options.data, options.images);
-  if (!annotated) return FailureFrom(annotated.error());
-  Detections detections;
-  if (Outcome failed = options.detections.empty() ? DetectAll(options, *annotated, &detections)
-                                                  : ReadAll(options, *annotated, &detections)) {
-    return failed;
-  }
+Outcome PrintScores(const EvalLinesOptions& options, const Detections& detections) {
   const std::vector<LineEvaluation>& images = detections.images;
-  if (!options.curve.empty()) {
-    if (Outcome failed = WriteCurve(options.curve, images)) return failed;
-  }
   const double ap[] = {StructuralAp(images, 5.0), StructuralAp(images, 10.0),
                        StructuralAp(images, 15.0)};
   const PixelScores pixels = EvaluatePixels(images);
@@ -129,6 +121,20 @@ Outcome RunEvalLines(const EvalLinesOptions& options) {
   report["images"] = images.size();
   report["ms_per_image"] = Rounded(ms_per_image, 3);
   return PrintJson(report);
+}
+
+Outcome RunEvalLines(const EvalLinesOptions& options) {
+  const Result<std::vector<AnnotatedImage>> annotated =
+      ReadLineAnnotations(options.data, options.images);
+  if (!annotated) return FailureFrom(annotated.error());
+  Detections detections;
+  if (Outcome failed = options.detections.empty() ? DetectAll(options, *annotated, &detections)
+                                                  : ReadAll(options, *annotated, &detections)) {
+    return failed;
+  }
+  // The scores first: they took long, and a curve that cannot be written must not lose them.
+  if (Outcome failed = PrintScores(options, detections)) return failed;
+  return options.curve.empty() ? Outcome() : WriteCurve(options.curve, detections.images);
 }
 
 }  // namespace

@@ -3,8 +3,10 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "plumb/base/json_depth.h"
 #include "tools/datasets/text_file.h"
 #include "tools/datasets/timestamp.h"
 #include "tools/datasets/trajectory.h"
@@ -74,10 +76,9 @@ Outcome ReadFrameRecords(const std::string& path, FrameRecords* out_records) {
   size_t begin = 0;
   for (int number = 1; begin < (*text).size(); ++number) {
     const size_t end = std::min((*text).find('\n', begin), (*text).size());
-    const Json frame =
-        Json::parse((*text).begin() + static_cast<std::ptrdiff_t>(begin),
-                    (*text).begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+    const std::string_view line = std::string_view(*text).substr(begin, end - begin);
     begin = end + 1;
+    const Json frame = IsShallowJson(line) ? Json::parse(line, nullptr, false) : Json();
     if (!frame.is_object() || !frame.contains("status") || !frame["status"].is_string()) {
       return Failure{kExitBadData,
                      path + ":" + std::to_string(number) + ": is no JSON object with a \"status\""};

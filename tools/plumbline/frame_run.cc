@@ -17,6 +17,7 @@
 #include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/point_front_end.h"
 #include "tools/plumbline/prior_files.h"
+#include "tools/plumbline/program.h"
 
 namespace plumb::tools {
 namespace {
@@ -180,7 +181,7 @@ void BindFrameRunOptions(CLI::App& command, FrameRunOptions& options) {
   command
       .add_option("--gravity-sigma", options.gravity_sigma_deg,
                   "Standard deviation of either angle of tilt, degrees")
-      ->check(CLI::Range(1e-3, 57.0))
+      ->check(FiniteRange(1e-3, 57.0))
       ->capture_default_str();
   command
       .add_option("--mode", options.mode,

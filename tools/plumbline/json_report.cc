@@ -16,10 +16,13 @@ double Rounded(double value, int decimals) {
   return std::round(value * scale) / scale;
 }
 
-Outcome PrintJson(const Json& json, JsonLayout layout) {
-  // File names need not be UTF-8; what is not becomes a replacement character.
+std::string ToJsonText(const Json& json, JsonLayout layout) {
   const int indent = layout == JsonLayout::kCompact ? -1 : 1;
-  return PrintText(json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n");
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Outcome PrintJson(const Json& json, JsonLayout layout) {
+  return PrintText(ToJsonText(json, layout));
 }
 
 Outcome PrintText(const std::string& text) {

@@ -23,6 +23,9 @@ enum class JsonLayout {
   kCompact,   // for long lists of numbers
 };
 
+/// The document as text. Of file names, what is not UTF-8 becomes a replacement character.
+std::string ToJsonText(const Json& json, JsonLayout layout = JsonLayout::kIndented);
+
 /// Prints the document alone on stdout.
 Outcome PrintJson(const Json& json, JsonLayout layout = JsonLayout::kIndented);
 

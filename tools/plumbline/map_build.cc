@@ -1,4 +1,5 @@
 // plumbline map build: a line map from posed key frames, with depth images or without.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -28,6 +29,8 @@
 
 namespace plumb::tools {
 namespace {
+
+constexpr ResultFiles kMapFiles = {kMapManifestName, IsMapFile};
 
 struct MapBuildOptions {
   std::string sequence, frames, colmap, images, out;
@@ -264,12 +267,34 @@ Outcome CheckOptions(const MapBuildOptions& options) {
   return std::nullopt;
 }
 
+/// An empty map would replace a good one. One of points alone is fine where they were asked for.
+Outcome CheckNotEmpty(const MapBuildOptions& options, const MapBuildStats& stats,
+                      const LineMap& map) {
+  const auto has_points = [](const KeyFrame& frame) { return !frame.points.empty(); };
+  if (!map.lines.empty() ||
+      (options.points == "opencv" &&
+       std::any_of(map.key_frames.begin(), map.key_frames.end(), has_points))) {
+    return std::nullopt;
+  }
+  const std::string segments = std::to_string(stats.num_segments) + " segments";
+  const std::string source = options.colmap.empty() ? options.sequence : options.colmap;
+  std::string why = "none of the " + segments;
+  if (stats.num_segments == 0) {
+    why = "no segment was found in " + std::to_string(stats.num_key_frames) + " key frames";
+  } else if (stats.num_lifted == 0) {
+    why += " got a depth";
+  } else {
+    why += " became a line (" + std::to_string(stats.num_lifted) + " got a depth)";
+  }
+  return Failure{kExitBadData, source + ": " + why + ", no map is written"};
+}
+
 Outcome RunMapBuild(const MapBuildOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   if (Outcome wrong = CheckOptions(options)) return wrong;
   BundleOptions bundle_options;
   if (Outcome failed = ReadPoseSigma(options, &bundle_options)) return failed;
-  if (Outcome failed = CheckReplaceable(options.out, "manifest.json")) return failed;
+  if (Outcome failed = CheckReplaceable(options.out, kMapFiles)) return failed;
   KeyFrameSource source;
   if (Outcome failed =
           options.colmap.empty()
@@ -298,10 +323,11 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   if (options.adjust_poses && !map.pose_change) {
     PrintRemark("no line is seen by two key frames, poses stay as they are");
   }
+  if (Outcome empty = CheckNotEmpty(options, builder.stats(), map)) return empty;
   if (options.calibrate) Calibrate(builder, &map);
   WriteMapOptions write_options;
   write_options.overwrite = true;
-  if (const Status written = WriteMap(map, options.out, write_options); !written) {
+  if (const Status written = WriteMap(map, PlainPath(options.out), write_options); !written) {
     const bool io = written.error().code == ErrorCode::kIoError;
     return Failure{io ? kExitIo : kExitCannotCreate, written.error().message};
   }

@@ -2,15 +2,27 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "tools/plumbline/exit_code.h"
 
 namespace plumb::tools {
 
-/// Checks that a directory of results could take its place at `path`: the parent exists and nothing
-/// is there but an empty directory or an earlier result, which holds a file named `marker`.
-/// @return kExitCannotCreate otherwise.
-Outcome CheckReplaceable(const std::string& path, const std::string& marker);
+/// What a command writes: tells its earlier results from other people's files.
+struct ResultFiles {
+  const char* marker = "";  // a file that every result holds
+  /// Whether a result may hold `name`, relative to its directory; folders end in a slash:
+  /// "rgb/", "rgb/000001.jpg".
+  bool (*holds)(std::string_view name) = nullptr;
+};
+
+/// Checks that a directory of results could take its place at `path`: its parent exists and can be
+/// written, and nothing is there but an empty directory or an earlier result alone.
+/// @return kExitCannotCreate otherwise, naming the first file that is no part of a result.
+Outcome CheckReplaceable(const std::string& path, const ResultFiles& files);
+
+/// `path` without what says nothing ("run/.", "run//"), a link at its end followed.
+std::string PlainPath(const std::string& path);
 
 /// Results are written into a temporary directory beside the final place; Commit() renames it. What
 /// was not committed is removed with the object, so that an error leaves nothing behind.
@@ -21,11 +33,9 @@ class OutputDirectory {
   OutputDirectory(const OutputDirectory&) = delete;
   OutputDirectory& operator=(const OutputDirectory&) = delete;
 
-  /// @param final_path  Replaced at Commit() if it is an empty directory or holds a file named
-  /// `marker`,
-  ///                    hence an earlier result; anything else there is refused with
-  ///                    kExitCannotCreate.
-  Outcome Open(const std::string& final_path, const std::string& marker);
+  /// @param final_path  Replaced at Commit() as CheckReplaceable() allows; anything else there is
+  ///                    refused.
+  Outcome Open(const std::string& final_path, const ResultFiles& files);
 
   /// Where to write until Commit().
   const std::string& path() const { return temporary_path_; }
@@ -33,9 +43,11 @@ class OutputDirectory {
   /// Writes a file into the directory. `name` may not hold a slash.
   Outcome Write(const std::string& name, const std::string& bytes);
 
+  /// Refuses what CheckReplaceable() would by now; an earlier result is then as it was.
   Outcome Commit();
 
  private:
+  ResultFiles files_;
   std::string final_path_;
   std::string temporary_path_;  // empty when there is nothing to remove
 };

@@ -1,6 +1,8 @@
 // Files with the coarse poses of a recorded sequence.
 #include "tools/plumbline/prior_files.h"
 
+#include <algorithm>
+#include <cstdio>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -12,6 +14,10 @@
 namespace plumb::tools {
 namespace {
 
+// What the refinement takes: 1000 m and 3.2 rad.
+constexpr double kMinPoseSize = 1e-7;  // cm or deg
+constexpr double kMaxPoseSizeCm = 1e5, kMaxPoseSizeDeg = 183.0;
+
 /// One prior a frame; nullopt where `path` has none. A file that names no frame is refused.
 /// @param option  That gave the size, for messages.
 Outcome ReadSomePriors(const std::string& path, const std::string& option, const std::string& size,
@@ -20,7 +26,8 @@ Outcome ReadSomePriors(const std::string& path, const std::string& option, const
   double cm = 0.0, deg = 0.0;
   if (Outcome failed = ParsePoseSize(option, size, &cm, &deg)) return failed;
   PosePrior prior;
-  prior.position_sigma_m = cm / 100.0;
+  // The smallest size must not be rounded below what the refinement takes.
+  prior.position_sigma_m = std::max(cm / 100.0, 1e-9);
   prior.rotation_sigma_rad = deg * std::numbers::pi / 180.0;
   const Result<Trajectory> poses = ReadTumTrajectory(path);
   if (!poses) return FailureFrom(poses.error());
@@ -44,17 +51,30 @@ Outcome ReadSomePriors(const std::string& path, const std::string& option, const
 
 Outcome ParsePoseSize(const std::string& option, const std::string& text, double* out_cm,
                       double* out_deg) {
+  const auto wrong = [&](const std::string& what) {
+    return Failure{kExitUsage, option + " " + Shortened(text) + ": " + what};
+  };
   const std::vector<DataLine> lines = DataLines(text);
-  if (lines.size() == 1 && lines[0].fields.size() == 2) {
-    const Result<double> cm = ParseNumber(lines[0].fields[0]);
-    const Result<double> deg = ParseNumber(lines[0].fields[1]);
-    if (cm && deg && *cm > 0.0 && *deg > 0.0) {
-      *out_cm = *cm;
-      *out_deg = *deg;
-      return std::nullopt;
-    }
+  if (lines.size() != 1 || lines[0].fields.size() != 2) {
+    return wrong("want two positive numbers, CM,DEG");
   }
-  return Failure{kExitUsage, option + " " + text + ": want two positive numbers, CM,DEG"};
+  const struct {
+    const char* unit;
+    double max;
+    double* out;
+  } parts[] = {{"cm", kMaxPoseSizeCm, out_cm}, {"deg", kMaxPoseSizeDeg, out_deg}};
+  for (size_t i = 0; i < 2; ++i) {
+    const Result<double> number = ParseNumber(lines[0].fields[i]);
+    if (!number || !(*number > 0.0)) return wrong("want two positive numbers, CM,DEG");
+    if (!(*number >= kMinPoseSize && *number <= parts[i].max)) {
+      char range[80];
+      std::snprintf(range, sizeof(range), "%.6g %s is outside %.6g to %.6g", *number, parts[i].unit,
+                    kMinPoseSize, parts[i].max);
+      return wrong(range);
+    }
+    *parts[i].out = *number;
+  }
+  return std::nullopt;
 }
 
 Outcome ReadPriors(const std::string& path, const std::string& size,

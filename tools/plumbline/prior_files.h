@@ -14,7 +14,7 @@ namespace plumb::tools {
 /// What is within it of a frame's time belongs to that frame.
 inline constexpr int64_t kSameFrameNs = 1'000'000;
 
-/// "CM,DEG", the value of `option`, into two positive numbers.
+/// "CM,DEG", the value of `option`, into two positive numbers in the range of the refinement.
 Outcome ParsePoseSize(const std::string& option, const std::string& text, double* out_cm,
                       double* out_deg);
 

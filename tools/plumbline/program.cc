@@ -1,7 +1,9 @@
 // The command line program: parses, runs one sub-command, turns its outcome into an exit code.
 #include "tools/plumbline/program.h"
 
+#include <cstdio>
 #include <exception>
+#include <vector>
 
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
@@ -47,12 +49,41 @@ void AddCommands(CLI::App& program, PendingRun& pending) {
   AddVersion(program, pending);
 }
 
+/// Says which word names no command; empty if that is not what is wrong.
+std::string UnknownCommand(const CLI::App& program) {
+  const CLI::App* app = &program;
+  std::string path;
+  while (!app->get_subcommands().empty()) {
+    app = app->get_subcommands().front();
+    path += app->get_name() + ": ";
+  }
+  const std::vector<std::string> words = program.remaining(true);
+  if (app->get_require_subcommand_min() == 0 || words.empty() || words.front().starts_with('-')) {
+    return "";
+  }
+  return path + "no command '" + words.front() + "'";
+}
+
 int Fail(const Failure& failure) {
   PrintRemark(failure.message);
   return failure.code;
 }
 
 }  // namespace
+
+CLI::Validator FiniteRange(double min, double max) {
+  char range[80];
+  std::snprintf(range, sizeof(range), "in [%.6g - %.6g]", min, max);
+  const std::string text = range;
+  return CLI::Validator(
+      [min, max, text](std::string& input) {
+        double value = 0.0;
+        const bool is_good =
+            CLI::detail::lexical_cast(input, value) && value >= min && value <= max;
+        return is_good ? std::string() : "Value " + input + " is not " + text;
+      },
+      "FLOAT " + text);
+}
 
 int RunProgram(int argc, const char* const* argv) {
   PendingRun pending;
@@ -66,7 +97,8 @@ int RunProgram(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& e) {
     // --help and --version arrive as "errors" with code 0.
     if (e.get_exit_code() == 0) return program.exit(e) == 0 ? kExitOk : kExitUsage;
-    return Fail({kExitUsage, std::string(e.what()) + " (try --help)"});
+    const std::string unknown = UnknownCommand(program);
+    return Fail({kExitUsage, (unknown.empty() ? e.what() : unknown) + " (try --help)"});
   }
   NoteInterrupts();
   try {

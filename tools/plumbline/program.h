@@ -29,6 +29,9 @@ CLI::App* AddCommand(CLI::App& parent, PendingRun& pending, const char* name,
   return command;
 }
 
+/// Accepts finite numbers from `min` to `max`; CLI::Range() lets NaN pass.
+CLI::Validator FiniteRange(double min, double max);
+
 /// Runs the program. Nothing is thrown; errors go to stderr as one line.
 /// @return an ExitCode.
 int RunProgram(int argc, const char* const* argv);

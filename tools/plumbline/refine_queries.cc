@@ -16,12 +16,14 @@
 #include "tools/synth/line_city.h"
 
 namespace plumb::tools {
-RefineQueries MakeCityQueries(const CityQueryOptions& options, LineMap* out_map) {
+Outcome MakeCityQueries(const CityQueryOptions& options, LineMap* out_map,
+                        RefineQueries* out_queries) {
   const synth::LineCity city({.num_lines = options.num_lines, .seed = options.seed});
-  RefineQueries out;
+  RefineQueries& out = *out_queries;
   out.camera = synth::LineCity::MakeCamera();
   synth::Random random(options.seed + 1);
   for (size_t i = 0; i < options.num_frames; ++i) {
+    if (Outcome interrupted = CheckInterrupt()) return interrupted;
     const synth::LineCity::Frame frame =
         city.MakeFrame(options.num_segments, options.num_points, &random);
     RefineQuery& query = out.queries.emplace_back();
@@ -36,7 +38,7 @@ RefineQueries MakeCityQueries(const CityQueryOptions& options, LineMap* out_map)
     query.true_cam_from_world = frame.cam_from_world;
   }
   *out_map = city.map();
-  return out;
+  return std::nullopt;
 }
 
 Outcome ReadQueries(FrameRun* run, const std::string& segments_path, size_t limit,

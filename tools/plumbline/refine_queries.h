@@ -33,7 +33,8 @@ struct CityQueryOptions {
 };
 
 /// A generated map and frames in it (tools/synth/line_city).
-RefineQueries MakeCityQueries(const CityQueryOptions& options, LineMap* out_map);
+Outcome MakeCityQueries(const CityQueryOptions& options, LineMap* out_map,
+                        RefineQueries* out_queries);
 
 /// The frames of a recorded sequence.
 /// @param segments_path  What `plumbline detect --refined --json` printed for images of the same

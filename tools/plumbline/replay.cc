@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -32,6 +33,18 @@ struct ReplayOptions {
   ReplayOptions() { run.mode = "independent"; }
 };
 
+constexpr std::string_view kOverlayPrefix = "overlay-", kOverlayEnding = ".png";
+
+bool IsReplayFile(std::string_view name) {
+  if (name == "trajectory.txt" || name == "frames.jsonl" || name == "summary.json") return true;
+  if (!name.starts_with(kOverlayPrefix) || !name.ends_with(kOverlayEnding)) return false;
+  name.remove_prefix(kOverlayPrefix.size());
+  name.remove_suffix(kOverlayEnding.size());
+  return ParseTimestamp(name).has_value();
+}
+
+constexpr ResultFiles kReplayFiles = {"summary.json", IsReplayFile};
+
 /// Whether frame `index` of `num_frames` is one of `count` evenly spaced ones.
 bool IsPicked(size_t index, size_t num_frames, size_t count) {
   if (count >= num_frames) return true;
@@ -47,7 +60,7 @@ class ReplayWriter {
 
   Outcome Add(size_t index, const FrameResult& result) {
     trajectory_.push_back({result.timestamp_ns, result.refined.cam_from_world});
-    frames_jsonl_ += DescribeFrame(result).dump() + "\n";
+    frames_jsonl_ += ToJsonText(DescribeFrame(result), JsonLayout::kCompact);
     statistics_.Add(result);
     if (!IsPicked(index, run_.frames.size(), options_.overlays)) return std::nullopt;
     return WriteOverlay(index, result);
@@ -57,7 +70,7 @@ class ReplayWriter {
     if (Outcome failed = out_->Write("trajectory.txt", FormatTumTrajectory(trajectory_)))
       return failed;
     if (Outcome failed = out_->Write("frames.jsonl", frames_jsonl_)) return failed;
-    return out_->Write("summary.json", summary.dump(1) + "\n");
+    return out_->Write("summary.json", ToJsonText(summary));
   }
 
   const FrameStatistics& statistics() const { return statistics_; }
@@ -70,7 +83,8 @@ class ReplayWriter {
                                         run_.sequence.rectifier, *run_.index, result);
     std::vector<uint8_t> png;
     cv::imencode(".png", picture, png);
-    return out_->Write("overlay-" + FormatTimestamp(result.timestamp_ns) + ".png",
+    const std::string time = FormatTimestamp(result.timestamp_ns);
+    return out_->Write(std::string(kOverlayPrefix) + time + std::string(kOverlayEnding),
                        std::string(png.begin(), png.end()));
   }
 
@@ -119,10 +133,10 @@ std::string ToText(const Json& summary) {
 Outcome RunReplay(const ReplayOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   OutputDirectory out;
-  if (Outcome failed = CheckReplaceable(options.out, "summary.json")) return failed;
+  if (Outcome failed = CheckReplaceable(options.out, kReplayFiles)) return failed;
   FrameRun run;
   if (Outcome failed = OpenFrameRun(options.run, &run)) return failed;
-  if (Outcome failed = out.Open(options.out, "summary.json")) return failed;
+  if (Outcome failed = out.Open(options.out, kReplayFiles)) return failed;
   ReplayWriter writer(run, options, &out);
   {
     ProgressBar progress("replay", run.frames.size());
@@ -158,7 +172,7 @@ void AddReplay(CLI::App& program, PendingRun& pending) {
             .add_option("--overlay-brightness", options.overlay_brightness,
                         "Of the camera's image behind the lines: 1 as it is, 0 leaves it out, for "
                         "pictures that may be shown")
-            ->check(CLI::Range(0.0, 1.0))
+            ->check(FiniteRange(0.0, 1.0))
             ->capture_default_str();
         command.add_flag("--json", options.json, "Print the summary as JSON");
         command.footer(

@@ -5,6 +5,7 @@
 
 #include "tools/plumbline/commands.h"
 #include "tools/plumbline/console.h"
+#include "tools/plumbline/interrupt.h"
 #include "tools/plumbline/json_report.h"
 #include "tools/plumbline/output_directory.h"
 #include "tools/synth/sequence_writer.h"
@@ -20,6 +21,8 @@ struct SynthOptions {
   bool json = false;
 };
 
+constexpr ResultFiles kSynthFiles = {"lines3d.txt", synth::IsSequenceFile};
+
 Outcome RunSynth(SynthOptions options) {
   const LensModel model = options.camera_model == "RADTAN"           ? LensModel::kRadTan
                           : options.camera_model == "KANNALA_BRANDT" ? LensModel::kKannalaBrandt
@@ -31,11 +34,18 @@ Outcome RunSynth(SynthOptions options) {
     return Failure{kExitUsage, valid.error().message};
   }
   OutputDirectory output;
-  if (Outcome failed = output.Open(options.out, "lines3d.txt")) return failed;
+  if (Outcome failed = output.Open(options.out, kSynthFiles)) return failed;
   {
     ProgressBar progress("synth", static_cast<size_t>(options.sequence.num_frames));
-    const Status written = synth::WriteSequence(options.sequence, output.path(),
-                                                [&](int, int) { progress.Advance(); });
+    Outcome interrupted;
+    const Status written =
+        synth::WriteSequence(options.sequence, output.path(), [&](int, int) -> Status {
+          progress.Advance();
+          interrupted = CheckInterrupt();
+          if (interrupted) return Error{ErrorCode::kInternal, interrupted->message};
+          return Ok();
+        });
+    if (interrupted) return interrupted;
     if (!written) return Failure{kExitIo, written.error().message};
   }
   if (Outcome failed = output.Commit()) return failed;
@@ -55,7 +65,11 @@ void AddSynth(CLI::App& program, PendingRun& pending) {
       program, pending, "synth", "Render a furnished room as a posed RGB-D sequence",
       [](CLI::App& command, SynthOptions& options) {
         synth::SequenceOptions& s = options.sequence;
-        command.add_option("--out", options.out, "Directory to create")->required();
+        command
+            .add_option(
+                "--out", options.out,
+                "Directory to create; an earlier sequence of this command there is replaced")
+            ->required();
         command.add_option("--seed", s.seed, "Room and camera path")->capture_default_str();
         command.add_option("--frames", s.num_frames, "Frames")->capture_default_str();
         command.add_option("--map-every", s.map_every, "Every so many frames is a map frame")

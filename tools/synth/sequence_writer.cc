@@ -33,6 +33,8 @@ constexpr double kDepthUnitsPerMetre = 1000.0;
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kMinAnnotatedPx = 8.0;
 
+constexpr std::array<const char*, 3> kFolders = {"rgb/", "depth/", "splits/"};
+
 struct PriorSize {
   const char* name;
   double position_m, rotation_deg;
@@ -190,12 +192,12 @@ Status SequenceOptions::Validate() const {
 }
 
 Status WriteSequence(const SequenceOptions& options, const std::string& directory,
-                     const std::function<void(int, int)>& progress) {
+                     const std::function<Status(int, int)>& progress) {
   if (const Status valid = options.Validate(); !valid) return valid.error();
   const fs::path root(directory);
-  for (const char* folder : {"rgb", "depth", "splits"}) {
+  for (const char* folder : kFolders) {
     std::error_code failure;
-    fs::create_directory(root / folder, failure);
+    fs::create_directory((root / folder).parent_path(), failure);
     if (failure) return Error{ErrorCode::kInternal, "cannot create " + (root / folder).string()};
   }
 
@@ -241,7 +243,8 @@ Status WriteSequence(const SequenceOptions& options, const std::string& director
     rgb_list += stamp + " rgb/" + rgb + "\n";
     depth_list += stamp + " depth/" + depth + "\n";
     edges.Add(scene, rectifier, pose, rgb);
-    if (progress) progress(frame + 1, options.num_frames);
+    if (!progress) continue;
+    if (const Status go_on = progress(frame + 1, options.num_frames); !go_on) return go_on.error();
   }
 
   const std::string camera_json =
@@ -256,6 +259,26 @@ Status WriteSequence(const SequenceOptions& options, const std::string& director
       return written.error();
   }
   return WritePoses(options, truth, root);
+}
+
+bool IsSequenceFile(std::string_view name) {
+  const auto is = [&](std::string_view known) { return name == known; };
+  if (std::any_of(kFolders.begin(), kFolders.end(), is)) return true;
+  constexpr std::array<std::string_view, 9> kFiles = {
+      "rgb.txt",         "depth.txt",        "camera.json",
+      "groundtruth.txt", "lines3d.txt",      "annotations.json",
+      "splits/map.txt",  "splits/query.txt", "splits/prior_drift.txt"};
+  if (std::any_of(kFiles.begin(), kFiles.end(), is)) return true;
+  for (const PriorSize& size : kPriorSizes) {
+    if (name == "splits/prior_" + std::string(size.name) + ".txt") return true;
+  }
+  // Images have a number of six digits.
+  const auto is_image = [&](std::string_view folder, std::string_view ending) {
+    return name.size() == folder.size() + 6 + ending.size() && name.starts_with(folder) &&
+           name.ends_with(ending) &&
+           name.substr(folder.size(), 6).find_first_not_of("0123456789") == name.npos;
+  };
+  return is_image("rgb/", ".jpg") || is_image("rgb/", ".png") || is_image("depth/", ".png");
 }
 
 }  // namespace plumb::synth

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 
 #include "plumb/base/result.h"
 #include "plumb/geometry/lens.h"
@@ -39,9 +40,13 @@ struct SequenceOptions {
 ///
 /// prior_pXX: the truth moved by exactly XX cm and 0.5, 1, 2, 4 or 8 deg; prior_drift: a tracker
 /// that is never corrected.
-/// @param progress  Called with (frames done, frames in all); may be empty.
+/// @param progress  Called with (frames done, frames in all); an error of it ends the work and is
+///                  returned; may be empty.
 /// @return kInvalidArgument naming a bad option; kInternal naming a file that cannot be written.
 Status WriteSequence(const SequenceOptions& options, const std::string& directory,
-                     const std::function<void(int, int)>& progress);
+                     const std::function<Status(int, int)>& progress);
+
+/// Whether WriteSequence() may write `name`, relative to its directory; folders end in a slash.
+bool IsSequenceFile(std::string_view name);
 
 }  // namespace plumb::synth

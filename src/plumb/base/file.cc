@@ -4,8 +4,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <climits>
 #include <cstdint>
 #include <system_error>
 
@@ -28,8 +30,33 @@ Status WriteAll(int fd, std::string_view content, const std::string& path) {
     if (count < 0) return SystemError(errno, "write", path);
     content.remove_prefix(static_cast<size_t>(count));
   }
+  return Ok();
+}
+
+Status WriteAndFlush(int fd, std::string_view content, const std::string& path) {
+  if (Status status = WriteAll(fd, content, path); !status) return status;
   if (fsync(fd) != 0) return SystemError(errno, "flush", path);
   return Ok();
+}
+
+/// Where the links at the end of `path` lead, the last file of which need not exist.
+Result<std::string> FollowLinks(std::string path) {
+  constexpr int kMaxLinks = 40;  // as the system has it
+  for (int i = 0; i < kMaxLinks; ++i) {
+    std::array<char, PATH_MAX> target = {};
+    const ssize_t size = readlink(path.c_str(), target.data(), target.size());
+    if (size < 0) return path;  // no link
+    const std::string next(target.data(), static_cast<size_t>(size));
+    path = next.starts_with('/') ? next : ParentDirectory(path) + "/" + next;
+  }
+  return SystemError(ELOOP, "follow the links of", path);
+}
+
+/// Devices and pipes are not replaced, they are written to; many of them cannot be flushed.
+Status WriteThrough(const std::string& path, std::string_view content) {
+  const FileDescriptor file(OpenAt(AT_FDCWD, path.c_str(), O_WRONLY | O_NOCTTY));
+  if (file.get() < 0) return SystemError(errno, "open", path);
+  return WriteAll(file.get(), content, path);
 }
 
 Result<std::string> ReadAll(int fd, size_t max_bytes, const std::string& path) {
@@ -101,7 +128,7 @@ Status WriteNewFileAt(const FileDescriptor& directory, const std::string& name,
   const FileDescriptor file(
       OpenAt(directory.get(), name.c_str(), O_WRONLY | O_CREAT | O_EXCL, 0666));
   if (file.get() < 0) return SystemError(errno, "create", path);
-  return WriteAll(file.get(), content, path);
+  return WriteAndFlush(file.get(), content, path);
 }
 
 Status SyncDirectory(const FileDescriptor& directory, const std::string& path) {
@@ -116,7 +143,14 @@ std::string TemporaryName(const std::string& path) {
          std::to_string(counter.fetch_add(1));
 }
 
-Status WriteFileAtomically(const std::string& path, std::string_view content) {
+Status WriteFileAtomically(const std::string& given_path, std::string_view content) {
+  struct stat info = {};
+  if (stat(given_path.c_str(), &info) == 0 && !S_ISREG(info.st_mode)) {
+    return WriteThrough(given_path, content);
+  }
+  const Result<std::string> followed = FollowLinks(given_path);
+  if (!followed) return followed.error();
+  const std::string& path = *followed;
   const std::string parent = ParentDirectory(path);
   Result<FileDescriptor> directory = OpenDirectory(parent);
   if (!directory) return directory.error();
@@ -127,7 +161,7 @@ Status WriteFileAtomically(const std::string& path, std::string_view content) {
     file = FileDescriptor(OpenAt(AT_FDCWD, temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL, 0666));
   } while (file.get() < 0 && errno == EEXIST);
   if (file.get() < 0) return SystemError(errno, "create", path);
-  Status status = WriteAll(file.get(), content, path);
+  Status status = WriteAndFlush(file.get(), content, path);
   if (status && rename(temporary.c_str(), path.c_str()) != 0) {
     status = SystemError(errno, "create", path);
   }

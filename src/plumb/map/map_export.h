@@ -20,7 +20,7 @@ struct MapExportOptions {
 };
 
 /// Writes the fused lines, in the map's order, in world coordinates [m], two vertices a line. The
-/// file appears complete or not at all; an existing one is replaced.
+/// file appears complete or not at all; an existing one is replaced, a device or pipe written to.
 /// @return kNotFound when the directory does not exist, kIoError when the system refuses.
 Status ExportLines(const LineMap& map, const std::string& path,
                    const MapExportOptions& options = {});

@@ -20,8 +20,9 @@
 namespace plumb {
 namespace {
 
-constexpr const char* kManifestName = "manifest.json";
+constexpr const char* kManifestName = kMapManifestName;
 constexpr const char* kTilesName = "tiles";
+constexpr std::string_view kTileEnding = ".plt";
 constexpr size_t kMaxManifestBytes = 64 << 10;
 
 /// Inside a map everything is the map's own fault, a missing file too.
@@ -59,7 +60,7 @@ bool HoldsOnlyMap(const std::string& directory) {
   if (std::find(names->begin(), names->end(), kTilesName) == names->end()) return true;
   const auto tiles = NamesIn(Inside(directory, kTilesName));
   return tiles && std::all_of(tiles->begin(), tiles->end(), [](const std::string& name) {
-           return std::string_view(name).ends_with(".plt");
+           return std::string_view(name).ends_with(kTileEnding);
          });
 }
 
@@ -68,7 +69,7 @@ void RemoveMap(const std::string& directory) {
   const std::string tiles = Inside(directory, kTilesName);
   if (const auto names = NamesIn(tiles)) {
     for (const std::string& name : *names) {
-      if (std::string_view(name).ends_with(".plt")) unlink(Inside(tiles, name).c_str());
+      if (std::string_view(name).ends_with(kTileEnding)) unlink(Inside(tiles, name).c_str());
     }
   }
   rmdir(tiles.c_str());
@@ -157,6 +158,14 @@ Result<MapTiles> ReadTiles(const FileDescriptor& map_fd, const MapManifest& mani
 }
 
 }  // namespace
+
+bool IsMapFile(std::string_view name) {
+  if (name == kManifestName) return true;
+  const std::string folder = std::string(kTilesName) + "/";
+  if (!name.starts_with(folder)) return false;
+  name.remove_prefix(folder.size());
+  return name.empty() || (name.ends_with(kTileEnding) && name.find('/') == name.npos);
+}
 
 Status WriteMap(const LineMap& map, const std::string& directory, const WriteMapOptions& options) {
   if (Status status = CheckMap(map); !status) return status;

@@ -2,11 +2,18 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "plumb/base/result.h"
 #include "plumb/map/line_map.h"
 
 namespace plumb {
+
+/// The file that every map holds.
+inline constexpr const char* kMapManifestName = "manifest.json";
+
+/// Whether a map may hold `name`, relative to its directory; folders end in a slash.
+bool IsMapFile(std::string_view name);
 
 struct WriteMapOptions {
   /// Replace an existing map. Only a directory that holds nothing but a map, or nothing, is

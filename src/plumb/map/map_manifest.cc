@@ -11,12 +11,13 @@
 #include <optional>
 #include <utility>
 
+#include "plumb/base/json_depth.h"
+
 namespace plumb {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kMaxDepth = 8;
 constexpr double kMaxOrigin = 1e7;
 constexpr uint64_t kMaxSidePx = 65536;
 constexpr std::string_view kChecksumKey = "  \"xxh3\": \"";
@@ -41,26 +42,6 @@ std::optional<uint64_t> ParseHex(const std::string& text) {
 
 Error Corrupt(const std::string& what) {
   return {ErrorCode::kCorruptData, "The map's manifest " + what};
-}
-
-/// A parser of JSON may recurse once a level.
-bool IsShallow(std::string_view text) {
-  int depth = 0;
-  bool in_string = false;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      if (c == '"') in_string = false;
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '{' || c == '[') {
-      if (++depth > kMaxDepth) return false;
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return true;
 }
 
 const Json* Member(const Json& object, const char* key) {
@@ -287,7 +268,7 @@ Result<MapManifest> ParseManifest(std::string_view text) {
       text.substr(body.size()) != Hex(Checksum(body)) + std::string(kEnd)) {
     return Corrupt("does not match its checksum");
   }
-  if (!IsShallow(text)) return Corrupt("is nested too deeply");
+  if (!IsShallowJson(text)) return Corrupt("is nested too deeply");
   const Json root = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (root.is_discarded()) return Corrupt("is not JSON");
   return ParseMembers(root);

@@ -158,6 +158,9 @@ static void test_other_misuse(const plumb_map* map) {
                "struct_size 0");
   EXPECT_ERROR(plumb_session_get_stats(NULL, &stats), PLUMB_ERROR_INVALID_ARGUMENT, "session");
   EXPECT_ERROR(plumb_log_set_callback(NULL, NULL, 17), PLUMB_ERROR_INVALID_ARGUMENT, "min_level");
+  result.struct_size = sizeof result - 1;
+  EXPECT_ERROR(plumb_session_poll_result(session, &result), PLUMB_ERROR_INVALID_ARGUMENT,
+               "struct_size");
   result.struct_size = 12;
   EXPECT_ERROR(plumb_session_poll_result(session, &result), PLUMB_ERROR_INVALID_ARGUMENT,
                "struct_size 12");

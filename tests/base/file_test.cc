@@ -130,6 +130,19 @@ TEST(WriteFileAtomically, ReplacesWhatALinkLeadsTo) {
   EXPECT_EQ(WriteFileAtomically(root / "loop", "x").error().code, ErrorCode::kCorruptData);
 }
 
+TEST(WriteFileAtomically, WritesToTheEndOfWhatIsOpen) {
+  const TemporaryDirectory root;
+  Spill(root / "out", "before,");
+  const int open_file = open((root / "out").c_str(), O_WRONLY | O_APPEND);
+  ASSERT_GE(open_file, 0);
+  // As /dev/stdout leads there.
+  std::filesystem::create_symlink("/proc/self/fd/" + std::to_string(open_file), root / "link");
+  ASSERT_TRUE(WriteFileAtomically(root / "link", "text,"));
+  EXPECT_EQ(write(open_file, "after", 5), 5);
+  close(open_file);
+  EXPECT_EQ(Slurp(root / "out"), "before,text,after");
+}
+
 TEST(WriteFileAtomically, WritesIntoPipesAndDevices) {
   const TemporaryDirectory root;
   ASSERT_EQ(mkfifo((root / "pipe").c_str(), 0600), 0);

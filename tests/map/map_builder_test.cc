@@ -485,6 +485,11 @@ TEST(MapBuilderWithBoth, WithoutDepthTheViewsLift) {
   }
   EXPECT_LT(MedianError(both, DrawnRoom()), 0.03);
   EXPECT_GT(both.lines.size(), 20u);
+  // Nothing to calibrate on but the map itself.
+  MapBuilder builder(options);
+  for (const KeyFrameInput& frame : recording.frames) ASSERT_TRUE(builder.AddKeyFrame(frame));
+  ASSERT_TRUE(builder.Build());
+  EXPECT_TRUE(builder.KeyFramesApart().empty());
 }
 
 TEST(MapBuilder, KeepsWhatTheCallerAttaches) {

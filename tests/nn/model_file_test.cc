@@ -48,8 +48,8 @@ TEST(ModelFile, ReadsBackWhatWasWritten) {
 
 TEST(ModelFile, APresetIsAPlainName) {
   const Model model = RandomModel(SmallSpec(), 1);
-  for (const std::string& name : {std::string("../nano"), std::string("na no"),
-                                  std::string(64, 'x')}) {
+  for (const std::string& name :
+       {std::string("../nano"), std::string("na no"), std::string(64, 'x')}) {
     Metadata metadata = MetadataOf(model.spec);
     metadata["preset"] = name;
     EXPECT_THAT(ErrorOf(ModelBytes(model, metadata)), HasSubstr("preset"));

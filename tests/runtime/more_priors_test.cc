@@ -253,8 +253,7 @@ TEST(MorePriors, BadOnesAreNamedByTheirPlace) {
   EXPECT_THAT(error_of({bad, good}), HasSubstr("more_priors[0]: rotation"));
   bad = good;
   bad.position_sigma_m = -0.5;
-  EXPECT_THAT(error_of({good, good, bad}),
-              HasSubstr("more_priors[2].position_sigma_m -0.5"));
+  EXPECT_THAT(error_of({good, good, bad}), HasSubstr("more_priors[2].position_sigma_m -0.5"));
   bad = good;
   bad.gravity = GravityPrior{.sigma_rad = 2.0};
   EXPECT_THAT(error_of({bad}), HasSubstr("more_priors[0]: gravity uncertainty 2 rad"));

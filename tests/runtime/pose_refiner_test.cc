@@ -437,7 +437,7 @@ TEST(PoseRefinerBudget, AWeakPoseWithoutTimeForItsRivalsIsAmbiguous) {
   const std::vector<Segment3> lines = testing::FenceLines(0.5);
   std::vector<Rigid3> key_frames;
   for (int k = 0; k < 9; ++k) key_frames.push_back(LookAlong({0, -2.0 + 0.5 * k, 0}, {1, 0, 0}));
-  Scene free(lines, {}, key_frames), bounded(lines, {.time_budget_ns = 1}, key_frames);
+  Scene bounded(lines, {.time_budget_ns = 1}, key_frames);
   Random random(9);
   int weak = 0;
   for (int k = 0; k < 40; ++k) {
@@ -452,9 +452,11 @@ TEST(PoseRefinerBudget, AWeakPoseWithoutTimeForItsRivalsIsAmbiguous) {
     } else {
       EXPECT_TRUE(HaveSameBits(result.cam_from_world, prior)) << "query " << k;
     }
-    weak += result.status == RefineStatus::kAmbiguous && result.evidence_nats > 0.0;
+    // Nothing else found was as good: only the rivals that nobody looked for speak against it.
+    weak += result.status == RefineStatus::kAmbiguous && result.evidence_nats > 8.0 &&
+            result.runner_up_ratio < 0.5;
   }
-  EXPECT_GE(weak, 5);
+  EXPECT_GE(weak, 3);
 }
 
 TEST(PoseRefiner, ATiltThatGravityRightsIsReturned) {

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <new>
 #include <string>
 #include <thread>
 #include <utility>
@@ -77,7 +78,7 @@ class GatedDetector : public LineDetector {
     int num_submitted = 0, num_collected = 0;
     bool is_in_background = false;
     ErrorCode error = ErrorCode::kInternal;
-    bool fails = false, is_stuck = false;
+    bool fails = false, is_stuck = false, is_out_of_memory = false;
 
     void Allow(int count) {
       const std::scoped_lock lock(mutex);
@@ -108,6 +109,10 @@ class GatedDetector : public LineDetector {
       control_->changed.wait(lock,
                              [&] { return control_->num_collected <= control_->num_allowed; });
       if (control_->is_stuck) return Error{ErrorCode::kInternal, "no answer in time"};
+      if (std::exchange(control_->is_out_of_memory, false)) {
+        (void)lsd_->Collect();
+        throw std::bad_alloc();
+      }
     }
     return lsd_->Collect();
   }
@@ -400,6 +405,18 @@ TEST_F(SessionTest, DeviceThatDoesNotAnswerIsLost) {
   const Result<SubmitOutcome> refused = session_->Submit(TheRoom().Frame(1, PriorError()));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kDeviceLost);
+}
+
+TEST_F(SessionTest, DeviceThatAnsweredIsNotLostForWantOfMemory) {
+  control_->is_in_background = true;
+  control_->is_out_of_memory = true;
+  Start(Blocking());
+  Submit(0);
+  const FrameResult result = Next();
+  EXPECT_EQ(result.outcome, FrameOutcome::kFailed);
+  EXPECT_EQ(result.error.code, ErrorCode::kOutOfMemory);
+  Submit(1);
+  EXPECT_EQ(Next().outcome, FrameOutcome::kProcessed);
 }
 
 TEST_F(SessionTest, TimestampsMustIncrease) {

@@ -165,6 +165,9 @@ TEST(StreamOptions, ValidateNamesTheMemberOutOfRange) {
   options.rotation_sigma_rad = 3.3;
   EXPECT_FALSE(options.Validate());
   options = {};
+  options.position_sigma_m = 1e-12;
+  EXPECT_FALSE(options.Validate());
+  options = {};
   options.lost_support_share = 1.0;
   EXPECT_FALSE(options.Validate());
   options = {};

@@ -101,7 +101,7 @@ TEST(OutputDirectory, KeepsWhatOthersPutThereMeanwhile) {
 
 TEST(OutputDirectory, NamesWithoutMeaningAreLeftOut) {
   const TemporaryDirectory dir;
-  for (const char* name : {"run", "run/.", "run//", "./run/../run/"}) {
+  for (const char* name : {"run", "run/.", "run//", "./run/../run/./"}) {
     OutputDirectory out;
     ASSERT_FALSE(out.Open(dir / name, kFiles)) << name;
     ASSERT_FALSE(out.Write("marker", name));
@@ -126,6 +126,12 @@ TEST(OutputDirectory, FollowsALinkAndKeepsIt) {
   ASSERT_FALSE(out.Write("marker", "new"));
   ASSERT_FALSE(out.Commit());
   EXPECT_TRUE(std::filesystem::is_symlink(dir / "link"));
+  // As the system has it, ".." is where the link leads.
+  OutputDirectory beside;
+  ASSERT_FALSE(beside.Open(dir / "link/../other", kFiles));
+  ASSERT_FALSE(beside.Write("marker", "beside"));
+  ASSERT_FALSE(beside.Commit());
+  EXPECT_EQ(ReadAll(dir / "disk/other/marker"), "beside");
   EXPECT_EQ(ReadAll(dir / "disk/run/marker"), "new");
   EXPECT_EQ(CheckReplaceable(dir / "dangling", kFiles)->code, kExitCannotCreate);
 }

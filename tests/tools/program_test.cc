@@ -110,7 +110,7 @@ TEST(Program, LongWorkCanBeInterrupted) {
        {"synth --frames 100000 --width 64 --height 64 --samples 1 --out " + (dir / "room"),
         std::string("bench refine --lines 2000 --num-frames 100000 --limit 100000"),
         std::string("bench refine --lines 2000 --num-frames 1 --repeat 1 --warm-up 1000000")}) {
-    const ProgramRun run = RunPlumbline(arguments, "timeout --preserve-status -s INT 0.5");
+    const ProgramRun run = RunPlumbline(arguments, "timeout --preserve-status -s INT 2");
     EXPECT_EQ(run.exit_code, 130) << arguments << ": " << run.err;
     EXPECT_THAT(run.out, IsEmpty());
     EXPECT_THAT(run.err, HasSubstr("interrupted"));

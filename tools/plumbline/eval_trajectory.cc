@@ -78,7 +78,10 @@ Outcome ReadFrameRecords(const std::string& path, FrameRecords* out_records) {
     const size_t end = std::min((*text).find('\n', begin), (*text).size());
     const std::string_view line = std::string_view(*text).substr(begin, end - begin);
     begin = end + 1;
-    const Json frame = IsShallowJson(line) ? Json::parse(line, nullptr, false) : Json();
+    if (!IsShallowJson(line)) {
+      return Failure{kExitBadData, path + ":" + std::to_string(number) + ": is nested too deeply"};
+    }
+    const Json frame = Json::parse(line, nullptr, false);
     if (!frame.is_object() || !frame.contains("status") || !frame["status"].is_string()) {
       return Failure{kExitBadData,
                      path + ":" + std::to_string(number) + ": is no JSON object with a \"status\""};

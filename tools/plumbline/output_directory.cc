@@ -83,9 +83,18 @@ OutputDirectory::~OutputDirectory() {
 }
 
 std::string PlainPath(const std::string& path) {
-  fs::path plain = fs::path(path).lexically_normal();
-  if (!plain.has_filename() && plain.has_relative_path()) plain = plain.parent_path();
+  fs::path plain = path;
+  // Slashes and dots at the end only: before "..", a link counts.
+  while (plain.has_parent_path() && plain.has_relative_path() &&
+         (!plain.has_filename() || plain.filename() == ".")) {
+    plain = plain.parent_path();
+  }
   std::error_code code;
+  // The way there must not lead through what is going to be replaced.
+  if (std::find(plain.begin(), plain.end(), "..") != plain.end()) {
+    const fs::path parent = fs::canonical(plain.parent_path(), code);
+    if (!code && plain.filename() != "..") plain = parent / plain.filename();
+  }
   if (!fs::is_symlink(plain, code)) return plain.string();
   const fs::path target = fs::canonical(plain, code);
   return code ? plain.string() : target.string();

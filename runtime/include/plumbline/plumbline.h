@@ -291,8 +291,8 @@ typedef struct plumb_frame {
   int32_t prior_uncertainty; /* PLUMB_UNCERTAINTY_* */
   double prior_q_xyzw[4];    /* unit length to 1e-3 */
   double prior_t_m[3];
-  /* One standard deviation of the norm of the whole error vector; 0: 0.10 m and 0.0349 rad. In
-   * stream mode: of the tracker's drift. */
+  /* One standard deviation of the norm of the whole error vector, 1e-9..1000 m and 1e-9..3.2 rad;
+   * 0: 0.10 m and 0.0349 rad. In stream mode: of the tracker's drift. */
   double prior_position_sigma_m, prior_rotation_sigma_rad;
   double prior_covariance[36]; /* positive semi-definite; only its size counts today */
   /* Optional 2D-3D correspondences: x, y [px of the image as it is; those that the lens cannot have
@@ -305,7 +305,8 @@ typedef struct plumb_frame {
   uint32_t num_points;
   uint32_t reserved; /* 0 */
   /* NULL: the image is copied. Otherwise the planes must stay valid until this was called, which
-   * happens exactly once for every accepted frame, at the latest in plumb_session_destroy. */
+   * happens exactly once for every accepted frame, at the latest in plumb_session_destroy; of a
+   * frame that is replaced on the thread that submits the newer one. It may submit a frame. */
   void (*release)(void* user);
   void* release_user;
   int32_t lens_model;        /* PLUMB_LENS_* */
@@ -330,8 +331,8 @@ typedef struct plumb_frame {
 } plumb_frame;
 
 /* Every accepted frame gives exactly one result, in the order of submission.
- * OK, FRAME_REPLACED, TIMEOUT (not accepted); INVALID_ARGUMENT names the broken value; DEVICE_LOST.
- */
+ * OK, FRAME_REPLACED, TIMEOUT (not accepted); INVALID_ARGUMENT names the broken value; UNSUPPORTED:
+ * a newer caller's members are set; DEVICE_LOST; OUT_OF_MEMORY (not accepted). */
 PLUMB_API plumb_result plumb_session_submit_frame(plumb_session* session, const plumb_frame* frame);
 
 /* --- Frame results ---------------------------------------------------------------------------- */

@@ -39,10 +39,10 @@ std::vector<std::string> ModelFolders() {
   return folders;
 }
 
-constexpr uint32_t kKnownFeatures =
-    PLUMB_VULKAN_BUFFER_DEVICE_ADDRESS | PLUMB_VULKAN_SHADER_INT64 | PLUMB_VULKAN_SHADER_FLOAT64 |
-    PLUMB_VULKAN_SHADER_FLOAT16 | PLUMB_VULKAN_STORAGE_16BIT | PLUMB_VULKAN_STORAGE_8BIT |
-    PLUMB_VULKAN_SCALAR_BLOCK_LAYOUT;
+constexpr uint32_t kKnownFeatures = PLUMB_VULKAN_BUFFER_DEVICE_ADDRESS | PLUMB_VULKAN_SHADER_INT64 |
+                                    PLUMB_VULKAN_SHADER_FLOAT64 | PLUMB_VULKAN_SHADER_FLOAT16 |
+                                    PLUMB_VULKAN_STORAGE_16BIT | PLUMB_VULKAN_STORAGE_8BIT |
+                                    PLUMB_VULKAN_SCALAR_BLOCK_LAYOUT;
 
 Result<std::shared_ptr<gpu::Device>> AdoptDevice(const plumb_vulkan_host& from) {
   constexpr size_t kSizeV1 = offsetof(plumb_vulkan_host, reserved) + sizeof from.reserved;

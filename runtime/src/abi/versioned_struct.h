@@ -15,8 +15,11 @@ namespace plumb::abi {
 /// Larger than any struct ever gets: an uninitialised size is caught before it is believed.
 inline constexpr uint32_t kMaxStructBytes = 1u << 16;
 
-/// Every member's size is a multiple of it: another size ends inside of one.
-inline constexpr uint32_t kMemberBytes = 4;
+/// Whether a struct may have this size. Every member's size is a multiple of four bytes: another
+/// one ends inside of a member. (Not every such size ends between two.)
+inline bool IsStructSize(uint32_t size, size_t size_v1) {
+  return size >= size_v1 && size <= kMaxStructBytes && size % 4 == 0;
+}
 
 /// A struct of this library's version with what the caller set; members that an older caller does
 /// not know are zero. `size_v1` is the size of the struct's first version.
@@ -28,7 +31,7 @@ Result<T> ReadStruct(const T* from, size_t size_v1, const char* name) {
     return Error{ErrorCode::kInvalidArgument, std::string(name) + " must not be NULL"};
   }
   const uint32_t size = from->struct_size;
-  if (size < size_v1 || size > kMaxStructBytes || size % kMemberBytes != 0) {
+  if (!IsStructSize(size, size_v1)) {
     return Error{ErrorCode::kInvalidArgument, std::string(name) + ".struct_size " +
                                                   std::to_string(size) + " is not the size of " +
                                                   name + " (" + std::to_string(sizeof(T)) + ")"};
@@ -51,7 +54,7 @@ Status CheckOutput(const T* to, size_t size_v1, const char* name) {
   if (to == nullptr) {
     return Error{ErrorCode::kInvalidArgument, std::string(name) + " must not be NULL"};
   }
-  if (to->struct_size < size_v1 || to->struct_size > kMaxStructBytes) {
+  if (!IsStructSize(to->struct_size, size_v1)) {
     return Error{ErrorCode::kInvalidArgument,
                  std::string(name) + ".struct_size " + std::to_string(to->struct_size) +
                      " is not the size of " + name + " (" + std::to_string(sizeof(T)) + ")"};

@@ -40,9 +40,12 @@ Status WriteAndFlush(int fd, std::string_view content, const std::string& path) 
 }
 
 /// Where the links at the end of `path` lead, the last file of which need not exist.
-Result<std::string> FollowLinks(std::string path) {
+/// @param is_open  Whether it is a file that a process holds open (/dev/stdout): there, it stays.
+Result<std::string> FollowLinks(std::string path, bool* is_open) {
   constexpr int kMaxLinks = 40;  // as the system has it
   for (int i = 0; i < kMaxLinks; ++i) {
+    *is_open = path.starts_with("/proc/") || path.starts_with("/dev/fd/");
+    if (*is_open) return path;
     std::array<char, PATH_MAX> target = {};
     const ssize_t size = readlink(path.c_str(), target.data(), target.size());
     if (size < 0) return path;  // no link
@@ -52,9 +55,10 @@ Result<std::string> FollowLinks(std::string path) {
   return SystemError(ELOOP, "follow the links of", path);
 }
 
-/// Devices and pipes are not replaced, they are written to; many of them cannot be flushed.
+/// Devices, pipes and what is open are not replaced, they are written to, a file at its end; many
+/// of them cannot be flushed.
 Status WriteThrough(const std::string& path, std::string_view content) {
-  const FileDescriptor file(OpenAt(AT_FDCWD, path.c_str(), O_WRONLY | O_NOCTTY));
+  const FileDescriptor file(OpenAt(AT_FDCWD, path.c_str(), O_WRONLY | O_NOCTTY | O_APPEND));
   if (file.get() < 0) return SystemError(errno, "open", path);
   return WriteAll(file.get(), content, path);
 }
@@ -148,8 +152,10 @@ Status WriteFileAtomically(const std::string& given_path, std::string_view conte
   if (stat(given_path.c_str(), &info) == 0 && !S_ISREG(info.st_mode)) {
     return WriteThrough(given_path, content);
   }
-  const Result<std::string> followed = FollowLinks(given_path);
+  bool is_open = false;
+  const Result<std::string> followed = FollowLinks(given_path, &is_open);
   if (!followed) return followed.error();
+  if (is_open) return WriteThrough(given_path, content);
   const std::string& path = *followed;
   const std::string parent = ParentDirectory(path);
   Result<FileDescriptor> directory = OpenDirectory(parent);

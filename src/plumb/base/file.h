@@ -56,8 +56,8 @@ Status SyncDirectory(const FileDescriptor& directory, const std::string& path);
 
 /// Replaces `path` by a file with `content`: a temporary file beside it is flushed and renamed, so
 /// that a reader sees the old content or the new one, and a failure leaves nothing behind. Of a
-/// link, the file that it leads to is replaced. Into a device or a pipe (/dev/stdout) `content` is
-/// written as it is.
+/// link, the file that it leads to is replaced. Into a device or a pipe `content` is written as it
+/// is, and to the end of a file that is open by the name of /dev/stdout.
 Status WriteFileAtomically(const std::string& path, std::string_view content);
 
 /// A name beside `path` that no other call of this process returns.

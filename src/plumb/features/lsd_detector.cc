@@ -34,9 +34,8 @@ class LsdDetector : public LineDetector {
       try {
         Detect(Luminance(image, &gray_));
       } catch (const cv::Exception& e) {
-        return Error{
-            e.code == cv::Error::StsNoMem ? ErrorCode::kOutOfMemory : ErrorCode::kInternal,
-            "LsdDetector: OpenCV failed: " + e.msg};
+        return Error{e.code == cv::Error::StsNoMem ? ErrorCode::kOutOfMemory : ErrorCode::kInternal,
+                     "LsdDetector: OpenCV failed: " + e.msg};
       }
     }
     in_flight_ = true;

@@ -133,9 +133,9 @@ Result<std::shared_ptr<Device>> Device::Adopt(const HostDevice& host) {
   vulkan->queue = static_cast<VkQueue>(host.queue);
   vulkan->queue_family = host.queue_family;
   if (!IsComputeFamily(vulkan->instance->table, vulkan->physical_device, host.queue_family)) {
-    return Error{ErrorCode::kInvalidArgument,
-                 "HostDevice: queue_family " + std::to_string(host.queue_family) + " of " +
-                     vulkan->info.name + " cannot compute"};
+    return Error{ErrorCode::kInvalidArgument, "HostDevice: queue_family " +
+                                                  std::to_string(host.queue_family) + " of " +
+                                                  vulkan->info.name + " cannot compute"};
   }
   vulkan->lock_queue = host.lock_queue;
   vulkan->unlock_queue = host.unlock_queue;

@@ -133,6 +133,7 @@ void MapBuilder::LiftByBoth(const MapBuildProgress& progress, std::vector<KeyFra
   }
   const DepthNoise& noise = options_.fusion.depth_noise;
   const std::optional<DepthFit> fit = FitDepthCorrection(CompareDepths(lifts), noise);
+  is_depth_compared_ = fit.has_value();
   if (fit) depth_fit_ = *fit;  // else too little depth to compare: as it is, beside the views
   stats_.depth_change = depth_fit_.median_change;
   for (size_t k = 0; k < key_frames->size(); ++k) {
@@ -155,6 +156,7 @@ Result<LineMap> MapBuilder::Build(const MapBuildProgress& progress) {
     if (progress) progress(kTriangulated * done);
   };
   depth_fit_ = {};
+  is_depth_compared_ = false;
   stats_.num_averaged = 0;
   stats_.depth_change = 0.0;
   switch (options_.depth_source) {
@@ -189,6 +191,7 @@ Result<LineMap> MapBuilder::Build(const MapBuildProgress& progress) {
 std::vector<KeyFrame> MapBuilder::KeyFramesApart() const {
   std::vector<KeyFrame> apart;
   if (options_.depth_source == DepthSource::kViews) return apart;
+  if (options_.depth_source == DepthSource::kBoth && !is_depth_compared_) return apart;
   for (const KeyFrame& frame : key_frames_) {
     apart.push_back({frame.timestamp_ns, frame.cam_from_world, frame.camera, {}, {}});
   }

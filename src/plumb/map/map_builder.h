@@ -80,8 +80,8 @@ class MapBuilder {
   Result<LineMap> Build(const MapBuildProgress& progress = {});
 
   /// The key frames as of the last Build(), without points and lines, each segment with the depth
-  /// of its own depth image alone (corrected): no frame knows what another one saw. Empty without
-  /// depth images.
+  /// of its own depth image alone (corrected): no frame knows what another one saw. Empty where
+  /// the views alone have lifted: with kViews, and where kBoth had too little depth to compare.
   std::vector<KeyFrame> KeyFramesApart() const;
 
   /// Of the last Build(); before it, of the frames added so far.
@@ -98,6 +98,7 @@ class MapBuilder {
   std::vector<std::vector<Segment2>> segments_;  // of the key frames
   std::vector<std::vector<LiftedPart>> parts_;   // of those, by their depth images
   DepthFit depth_fit_;                           // of the last Build()
+  bool is_depth_compared_ = false;               // with what the views say, in the last Build()
   std::unordered_set<int64_t> timestamps_;
   MapBuildStats stats_;
 };

@@ -53,14 +53,15 @@ Result<std::vector<std::string>> NamesIn(const std::string& directory) {
 bool HoldsOnlyMap(const std::string& directory) {
   const auto names = NamesIn(directory);
   if (!names) return false;
-  const bool plain = std::all_of(names->begin(), names->end(), [](const std::string& name) {
-    return name == kManifestName || name == kTilesName;
-  });
-  if (!plain) return false;
-  if (std::find(names->begin(), names->end(), kTilesName) == names->end()) return true;
+  bool has_tiles = false;
+  for (const std::string& name : *names) {
+    has_tiles |= name == kTilesName;
+    if (name != kTilesName && !IsMapFile(name)) return false;
+  }
+  if (!has_tiles) return true;
   const auto tiles = NamesIn(Inside(directory, kTilesName));
   return tiles && std::all_of(tiles->begin(), tiles->end(), [](const std::string& name) {
-           return std::string_view(name).ends_with(kTileEnding);
+           return IsMapFile(Inside(kTilesName, name));
          });
 }
 
@@ -69,7 +70,7 @@ void RemoveMap(const std::string& directory) {
   const std::string tiles = Inside(directory, kTilesName);
   if (const auto names = NamesIn(tiles)) {
     for (const std::string& name : *names) {
-      if (std::string_view(name).ends_with(kTileEnding)) unlink(Inside(tiles, name).c_str());
+      if (IsMapFile(Inside(kTilesName, name))) unlink(Inside(tiles, name).c_str());
     }
   }
   rmdir(tiles.c_str());

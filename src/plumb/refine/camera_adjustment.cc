@@ -100,8 +100,8 @@ class CameraProblem {
                 std::span<const Segment3> lines, const CameraAdjustmentOptions& options)
       : options_(options),
         start_(start),
-        unit_focal_px_(options.unit_focal_px.value_or(
-            Eigen::Vector2d(start.pinhole.fx, start.pinhole.fy))),
+        unit_focal_px_(
+            options.unit_focal_px.value_or(Eigen::Vector2d(start.pinhole.fx, start.pinhole.fy))),
         camera_(start),
         poses_(poses) {
     for (const Segment3& line : lines) {
@@ -155,8 +155,8 @@ class CameraProblem {
     line->across = pose.RotationMatrix() * line->across;
     // Pixels of an ideal image; those of the image as taken differ by what the lens
     // stretches there.
-    std::unique_ptr<ceres::CostFunction> cost(LineInCameraCost::Create(
-        *line, unit_focal_px_, *start, *end, options_.pixel_sigma_px));
+    std::unique_ptr<ceres::CostFunction> cost(
+        LineInCameraCost::Create(*line, unit_focal_px_, *start, *end, options_.pixel_sigma_px));
     double* const delta = deltas_[sighting.line].data();
     const double* const blocks[] = {changes, delta};
     std::array<double, 2> residuals = {};

@@ -166,10 +166,9 @@ void PoseSearch::DrawHypotheses(const SearchRegion& region, std::span<const Sear
 }
 
 void PoseSearch::RankAllInTwoPasses(const PoseSearchOptions& options) {
-  const size_t num_second =
-      std::max(ShareOf(std::max<size_t>(kMinSecondPass, hypotheses_.size() / kSecondPassDivisor),
-                       options),
-               options.num_aligned);
+  const size_t num_second = std::max(
+      ShareOf(std::max<size_t>(kMinSecondPass, hypotheses_.size() / kSecondPassDivisor), options),
+      options.num_aligned);
   stats_.num_scored = static_cast<uint32_t>(hypotheses_.size());
   if (num_second < hypotheses_.size()) {
     TakeEvery(samples_, kFewStride, &few_samples_);

@@ -1,6 +1,5 @@
 #include "plumb/runtime/frame_slot.h"
 
-#include <array>
 #include <cstring>
 #include <string>
 #include <utility>
@@ -74,8 +73,11 @@ Status ValidateFrame(const SessionFrame& frame) {
                    std::to_string(frame.image.width_px) + " x " +
                    std::to_string(frame.image.height_px));
   }
-  if (const Status valid = CheckPriors(frame.prior, frame.more_priors); !valid) return valid;
-  return CheckPoints(frame.points);
+  for (const Status& valid :
+       {CheckPriors(frame.prior, frame.more_priors), CheckPoints(frame.points)}) {
+    if (!valid) return Invalid(valid.error().message);
+  }
+  return Ok();
 }
 
 }  // namespace plumb

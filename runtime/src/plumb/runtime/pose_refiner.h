@@ -42,7 +42,8 @@ struct GravityPrior {
 /// A coarse pose and how far off it may be.
 struct PosePrior {
   Rigid3 cam_from_world;
-  /// Norms of the uncertainty (one standard deviation of the whole vector, not per component).
+  /// Norms of the uncertainty (one standard deviation of the whole vector, not per component), in
+  /// [1e-9, 1000] and [1e-9, 3.2].
   double position_sigma_m = 0.10;
   double rotation_sigma_rad = 0.0349;
   /// Makes the tilt more certain than the rest of the rotation. Ignored where it contradicts
@@ -101,7 +102,7 @@ struct RefineInput {
   bool search = true;
   uint64_t seed = 0;  // e.g. the frame's number; equal inputs and seeds give equal results
   /// What is left of the frame's time, for frames that several calls work on. Absent: all of
-  /// PoseRefinerOptions::time_budget_ns.
+  /// PoseRefinerOptions::time_budget_ns. Not for kPaper.
   std::optional<Deadline> deadline = std::nullopt;
 };
 
@@ -114,19 +115,19 @@ struct LineMatch {
 
 /// Where the time of the default method went [ns]; a second attempt is added to the first.
 struct RefineStages {
-  int64_t index_ns = 0;       // queries of the map's index and the lists made of them
-  int64_t field_ns = 0;       // distance fields of the search
-  int64_t score_ns = 0;       // drawing and scoring hypotheses
-  int64_t coarse_ns = 0;      // aligning them on the field
-  int64_t fine_ns = 0;        // soft association on the fused lines
-  int64_t support_ns = 0;     // what the acceptance gate compares
-  int64_t local_ns = 0;       // last step on the key frames' own lines
-  int64_t points_ns = 0;      // pose of the points alone
-  int64_t joint_ns = 0;       // lines and points together
-  int64_t covariance_ns = 0;  // and observability
-  int64_t report_ns = 0;      // matches at the final pose
+  int64_t index_ns = 0;         // queries of the map's index and the lists made of them
+  int64_t field_ns = 0;         // distance fields of the search
+  int64_t score_ns = 0;         // drawing and scoring hypotheses
+  int64_t coarse_ns = 0;        // aligning them on the field
+  int64_t fine_ns = 0;          // soft association on the fused lines
+  int64_t support_ns = 0;       // what the acceptance gate compares
+  int64_t local_ns = 0;         // last step on the key frames' own lines
+  int64_t points_ns = 0;        // pose of the points alone
+  int64_t joint_ns = 0;         // lines and points together
+  int64_t covariance_ns = 0;    // and observability
+  int64_t report_ns = 0;        // matches at the final pose
   uint32_t num_hypotheses = 0;  // that were scored
-  bool out_of_time = false;  // something was left out for the time budget
+  bool out_of_time = false;     // something was left out for the time budget
 
   RefineStages& operator+=(const RefineStages& other);
 };
@@ -168,6 +169,7 @@ class PoseRefiner {
   ///         not finite or out of range. "No better pose" is a status, not an error.
   Status Refine(const RefineInput& input, RefineResult* out_result);
 
+  /// As given to Create().
   const PoseRefinerOptions& options() const;
 
  private:

@@ -8,7 +8,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kMinSigma = 1e-9;
 constexpr double kMaxGravitySigmaRad = 1.0;
 constexpr double kUnitTolerance = 1e-3;
 // Coordinates beyond this are not pixels of any image [px].
@@ -25,6 +24,7 @@ std::string Text(double value) {
   std::snprintf(number, sizeof(number), "%.6g", value);
   return number;
 }
+
 // "(1.5, nan)"
 std::string Text(std::initializer_list<double> values) {
   std::string text;

@@ -9,7 +9,7 @@
 namespace plumb {
 
 /// A prior this uncertain is no prior; a tighter one than kMinSigma would divide by zero.
-inline constexpr double kMaxPositionSigmaM = 1e3, kMaxRotationSigmaRad = 3.2;
+inline constexpr double kMinSigma = 1e-9, kMaxPositionSigmaM = 1e3, kMaxRotationSigmaRad = 3.2;
 
 /// @return kInvalidArgument with one sentence that names the value and, in lists, its position.
 Status CheckRefineInput(const RefineInput& input);

@@ -85,9 +85,8 @@ void SearchMethod::Refine(const RefineInput& input, const Rigid3& kept, RefineRe
     } else {
       const bool is_another_pose = LookFarther(&trial);
       result->status = attempt.status;
-      result->runner_up_ratio =
-          std::max(is_another_pose ? 0.0 : result->runner_up_ratio,
-                   attempt.evidence.runner_up_ratio);
+      result->runner_up_ratio = std::max(is_another_pose ? 0.0 : result->runner_up_ratio,
+                                         attempt.evidence.runner_up_ratio);
     }
   }
   result->map_support = attempt.evidence.refined.map_share;

@@ -225,9 +225,12 @@ void Session::Impl::FinishDetection(FrameSlot* slot) {
     });
   }
   if (!slot->detection) {
-    // A device that does not give a frame back would refuse all that follow.
-    const bool is_stuck = was_submitted && detector->WorksInBackground();
-    if (is_stuck || slot->detection.error().code == ErrorCode::kDeviceLost) is_device_lost = true;
+    // A device that does not give a frame back would refuse all that follow. What the host's memory
+    // lacks afterwards has nothing to do with it.
+    const ErrorCode code = slot->detection.error().code;
+    const bool is_stuck =
+        was_submitted && detector->WorksInBackground() && code != ErrorCode::kOutOfMemory;
+    if (is_stuck || code == ErrorCode::kDeviceLost) is_device_lost = true;
   }
   slot->detect_end_ns = NowNs();
 }

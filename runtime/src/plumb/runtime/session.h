@@ -65,8 +65,8 @@ struct SessionFrame {
   uint64_t user_tag = 0;  // these two come back in the result
   uint32_t user_kind = 0;
   /// When set, the image is not copied: its planes must stay until the session has called this,
-  /// once, from any thread and without a lock held; also when the frame is dropped or the session
-  /// destroyed. Not called when Submit() does not accept the frame.
+  /// once, from any thread and without a lock held (it may submit a frame); also when the frame is
+  /// dropped or the session destroyed. Not called when Submit() does not accept the frame.
   void (*release)(void* user) = nullptr;
   void* release_user = nullptr;
 };

@@ -20,11 +20,11 @@ Status StreamOptions::Validate() const {
     return Error{ErrorCode::kInvalidArgument, std::string("StreamOptions: ") + name + " " +
                                                   std::to_string(value) + " is outside " + range};
   };
-  if (!(position_sigma_m > 0.0 && position_sigma_m <= kMaxPositionSigmaM)) {
-    return invalid("position_sigma_m", position_sigma_m, "(0, 1000]");
+  if (!(position_sigma_m >= kMinSigma && position_sigma_m <= kMaxPositionSigmaM)) {
+    return invalid("position_sigma_m", position_sigma_m, "[1e-9, 1000]");
   }
-  if (!(rotation_sigma_rad > 0.0 && rotation_sigma_rad <= kMaxRotationSigmaRad)) {
-    return invalid("rotation_sigma_rad", rotation_sigma_rad, "(0, 3.2]");
+  if (!(rotation_sigma_rad >= kMinSigma && rotation_sigma_rad <= kMaxRotationSigmaRad)) {
+    return invalid("rotation_sigma_rad", rotation_sigma_rad, "[1e-9, 3.2]");
   }
   if (!(lost_support_share >= 0.0 && lost_support_share < 1.0)) {
     return invalid("lost_support_share", lost_support_share, "[0, 1)");

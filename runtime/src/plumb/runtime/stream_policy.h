@@ -12,8 +12,8 @@
 namespace plumb {
 
 struct StreamOptions {
-  /// Norms of the prediction's uncertainty one frame after a success, (0, 1000] and (0, 3.2]; grow
-  /// with the square root of the frames since then, up to the tracker's own uncertainty.
+  /// Norms of the prediction's uncertainty one frame after a success, [1e-9, 1000], [1e-9, 3.2];
+  /// grow with the square root of the frames since then, up to the tracker's own uncertainty.
   double position_sigma_m = 0.02;
   double rotation_sigma_rad = 0.00873;  // 0.5 deg
   /// A frame whose map support is below this share of the running mean counts as lost, in [0, 1).

@@ -126,16 +126,7 @@ std::optional<Rigid3> PoseAt(std::span<const StampedPose> trajectory, int64_t ti
 
 const StampedPose* NearestPose(std::span<const StampedPose> trajectory, int64_t timestamp_ns,
                                int64_t tolerance_ns) {
-  const auto after = LowerBound(trajectory, timestamp_ns);
-  const StampedPose* nearest = nullptr;
-  int64_t best_ns = tolerance_ns;
-  // No difference of any two timestamps is taken: it need not fit.
-  if (after != trajectory.begin() && std::prev(after)->timestamp_ns >= timestamp_ns - best_ns) {
-    nearest = &*std::prev(after);
-    best_ns = timestamp_ns - nearest->timestamp_ns - 1;  // The later one must be strictly nearer.
-  }
-  if (after != trajectory.end() && after->timestamp_ns <= timestamp_ns + best_ns) nearest = &*after;
-  return nearest;
+  return NearestInTime(trajectory, timestamp_ns, tolerance_ns);
 }
 
 }  // namespace plumb::tools

@@ -57,26 +57,6 @@ Result<std::vector<StampedFile>> ReadFileList(const std::string& directory, cons
   return files;
 }
 
-/// Index of the item nearest in time within the tolerance, the earlier one at a tie.
-template <typename Item>
-std::optional<size_t> Nearest(const std::vector<Item>& items, int64_t timestamp_ns,
-                              int64_t tolerance_ns) {
-  const auto after =
-      std::lower_bound(items.begin(), items.end(), timestamp_ns,
-                       [](const Item& item, int64_t value) { return item.timestamp_ns < value; });
-  std::optional<size_t> nearest;
-  int64_t best_ns = tolerance_ns;
-  // No difference of any two timestamps is taken: it need not fit.
-  if (after != items.begin() && std::prev(after)->timestamp_ns >= timestamp_ns - best_ns) {
-    nearest = static_cast<size_t>(std::prev(after) - items.begin());
-    best_ns = timestamp_ns - std::prev(after)->timestamp_ns - 1;
-  }
-  if (after != items.end() && after->timestamp_ns <= timestamp_ns + best_ns) {
-    nearest = static_cast<size_t>(after - items.begin());
-  }
-  return nearest;
-}
-
 Status ReadCamera(const std::string& path, bool with_depth, TumSequence* sequence) {
   const Result<std::string> text = ReadFile(path);
   if (!text) return text.error();
@@ -121,8 +101,9 @@ Result<TumSequence> ReadTumSequence(const std::string& directory) {
     SequenceFrame frame;
     frame.timestamp_ns = image.timestamp_ns;
     frame.color_path = image.path;
-    if (const auto nearest = Nearest(depth, image.timestamp_ns, kMaxDepthDelayNs)) {
-      frame.depth_path = depth[*nearest].path;
+    if (const StampedFile* nearest =
+            NearestInTime<StampedFile>(depth, image.timestamp_ns, kMaxDepthDelayNs)) {
+      frame.depth_path = nearest->path;
     }
     frame.cam_from_world = PoseAt(truth, image.timestamp_ns);
     sequence.frames.push_back(std::move(frame));
@@ -143,17 +124,19 @@ Result<std::vector<SequenceFrame>> SelectFrames(const TumSequence& sequence,
     // Further fields are ignored, so that rgb.txt or a trajectory serves as a list too.
     const Result<int64_t> timestamp_ns = ParseTimestamp(line.fields[0]);
     if (!timestamp_ns) return corrupt(timestamp_ns.error().message);
-    const auto frame = Nearest(sequence.frames, *timestamp_ns, kSameFrameNs);
+    const SequenceFrame* frame =
+        NearestInTime<SequenceFrame>(sequence.frames, *timestamp_ns, kSameFrameNs);
     if (!frame) {
       return corrupt("timestamp " + std::string(line.fields[0]) + " names no frame of " +
                      sequence.directory + "/rgb.txt");
     }
-    if (named_in_line[*frame] != 0) {
+    int& named = named_in_line[static_cast<size_t>(frame - sequence.frames.data())];
+    if (named != 0) {
       return corrupt("timestamp " + std::string(line.fields[0]) + " names the frame of line " +
-                     std::to_string(named_in_line[*frame]) + " again");
+                     std::to_string(named) + " again");
     }
-    named_in_line[*frame] = line.number;
-    selected.push_back(sequence.frames[*frame]);
+    named = line.number;
+    selected.push_back(*frame);
   }
   if (selected.empty()) return Error{ErrorCode::kCorruptData, list_path + ": names no frame"};
   return selected;

@@ -87,9 +87,9 @@ Outcome WriteCurve(const std::string& path, const std::vector<LineEvaluation>& i
   }
   const Status written = WriteFileAtomically(path, text);
   if (written) return std::nullopt;
-  const bool io = written.error().code == ErrorCode::kIoError;
-  return Failure{io ? kExitIo : kExitCannotCreate,
-                 "--curve " + path + ": " + written.error().message};
+  Failure failure = FailureToWrite(written.error());
+  failure.message.insert(0, "--curve " + path + ": ");
+  return failure;
 }
 
 Outcome PrintScores(const EvalLinesOptions& options, const Detections& detections) {

@@ -15,4 +15,8 @@ ExitCode ExitCodeOf(ErrorCode code) {
 
 Failure FailureFrom(const Error& error) { return {ExitCodeOf(error.code), error.message}; }
 
+Failure FailureToWrite(const Error& error) {
+  return {error.code == ErrorCode::kIoError ? kExitIo : kExitCannotCreate, error.message};
+}
+
 }  // namespace plumb::tools

@@ -35,5 +35,7 @@ using Outcome = std::optional<Failure>;
 /// The exit code that fits a library's error.
 ExitCode ExitCodeOf(ErrorCode code);
 Failure FailureFrom(const Error& error);
+/// The same of an output: what the system refused to write is kExitIo, all else kExitCannotCreate.
+Failure FailureToWrite(const Error& error);
 
 }  // namespace plumb::tools

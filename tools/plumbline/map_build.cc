@@ -328,8 +328,7 @@ Outcome RunMapBuild(const MapBuildOptions& options) {
   WriteMapOptions write_options;
   write_options.overwrite = true;
   if (const Status written = WriteMap(map, PlainPath(options.out), write_options); !written) {
-    const bool io = written.error().code == ErrorCode::kIoError;
-    return Failure{io ? kExitIo : kExitCannotCreate, written.error().message};
+    return FailureToWrite(written.error());
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   return Report(options, builder.stats(), *built, seconds.count());

@@ -33,8 +33,7 @@ Outcome RunMapExport(const ExportOptions& options) {
   const Result<LineMap> map = ReadMap(options.map);
   if (!map) return FailureFrom(map.error());
   if (const Status written = ExportLines(*map, options.out, export_options); !written) {
-    const bool io = written.error().code == ErrorCode::kIoError;
-    return Failure{io ? kExitIo : kExitCannotCreate, written.error().message};
+    return FailureToWrite(written.error());
   }
   size_t num_lines = 0;
   for (const MapLine& line : map->lines) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "plumb/runtime/refine_input_check.h"
 #include "tools/datasets/text_file.h"
 #include "tools/datasets/timestamp.h"
 #include "tools/datasets/trajectory.h"
@@ -14,9 +15,10 @@
 namespace plumb::tools {
 namespace {
 
-// What the refinement takes: 1000 m and 3.2 rad.
-constexpr double kMinPoseSize = 1e-7;  // cm or deg
-constexpr double kMaxPoseSizeCm = 1e5, kMaxPoseSizeDeg = 183.0;
+// What the refinement takes, in cm and deg.
+constexpr double kMinPoseSize = 1e-7;
+constexpr double kMaxPoseSizeCm = 100.0 * kMaxPositionSigmaM, kMaxPoseSizeDeg = 183.0;
+static_assert(kMaxPoseSizeDeg * std::numbers::pi / 180.0 <= kMaxRotationSigmaRad);
 
 /// One prior a frame; nullopt where `path` has none. A file that names no frame is refused.
 /// @param option  That gave the size, for messages.
@@ -27,7 +29,7 @@ Outcome ReadSomePriors(const std::string& path, const std::string& option, const
   if (Outcome failed = ParsePoseSize(option, size, &cm, &deg)) return failed;
   PosePrior prior;
   // The smallest size must not be rounded below what the refinement takes.
-  prior.position_sigma_m = std::max(cm / 100.0, 1e-9);
+  prior.position_sigma_m = std::max(cm / 100.0, kMinSigma);
   prior.rotation_sigma_rad = deg * std::numbers::pi / 180.0;
   const Result<Trajectory> poses = ReadTumTrajectory(path);
   if (!poses) return FailureFrom(poses.error());

@@ -119,9 +119,10 @@ void MapBuilder::LiftByViews(const MapBuildProgress& progress,
 }
 
 void MapBuilder::LiftBySensor(std::vector<KeyFrame>* key_frames) const {
+  const DepthFit fit = depth_fit_.value_or(DepthFit{});
   for (size_t k = 0; k < key_frames->size(); ++k) {
     KeyFrame& frame = (*key_frames)[k];
-    frame.segments = FuseLifts({frame.cam_from_world, segments_[k], parts_[k], {}}, depth_fit_);
+    frame.segments = FuseLifts({frame.cam_from_world, segments_[k], parts_[k], {}}, fit);
   }
 }
 
@@ -132,14 +133,14 @@ void MapBuilder::LiftByBoth(const MapBuildProgress& progress, std::vector<KeyFra
     lifts.push_back({(*key_frames)[k].cam_from_world, segments_[k], parts_[k], by_views[k]});
   }
   const DepthNoise& noise = options_.fusion.depth_noise;
-  const std::optional<DepthFit> fit = FitDepthCorrection(CompareDepths(lifts), noise);
-  is_depth_compared_ = fit.has_value();
-  if (fit) depth_fit_ = *fit;  // else too little depth to compare: as it is, beside the views
-  stats_.depth_change = depth_fit_.median_change;
+  depth_fit_ = FitDepthCorrection(CompareDepths(lifts), noise);
+  // With too little depth to compare, it stays as it is beside the views.
+  const DepthFit fit = depth_fit_.value_or(DepthFit{});
+  stats_.depth_change = fit.median_change;
   for (size_t k = 0; k < key_frames->size(); ++k) {
     KeyFrame& frame = (*key_frames)[k];
-    frame.segments = FuseLifts(lifts[k], depth_fit_, noise, &stats_.num_averaged);
-    if (fit) CorrectPoints(fit->correction, frame.cam_from_world, &frame.points);
+    frame.segments = FuseLifts(lifts[k], fit, noise, &stats_.num_averaged);
+    if (depth_fit_) CorrectPoints(fit.correction, frame.cam_from_world, &frame.points);
   }
 }
 
@@ -155,8 +156,7 @@ Result<LineMap> MapBuilder::Build(const MapBuildProgress& progress) {
   const auto triangulated = [&progress](double done) {
     if (progress) progress(kTriangulated * done);
   };
-  depth_fit_ = {};
-  is_depth_compared_ = false;
+  depth_fit_.reset();
   stats_.num_averaged = 0;
   stats_.depth_change = 0.0;
   switch (options_.depth_source) {
@@ -191,7 +191,7 @@ Result<LineMap> MapBuilder::Build(const MapBuildProgress& progress) {
 std::vector<KeyFrame> MapBuilder::KeyFramesApart() const {
   std::vector<KeyFrame> apart;
   if (options_.depth_source == DepthSource::kViews) return apart;
-  if (options_.depth_source == DepthSource::kBoth && !is_depth_compared_) return apart;
+  if (options_.depth_source == DepthSource::kBoth && !depth_fit_) return apart;
   for (const KeyFrame& frame : key_frames_) {
     apart.push_back({frame.timestamp_ns, frame.cam_from_world, frame.camera, {}, {}});
   }

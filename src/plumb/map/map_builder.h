@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <unordered_set>
@@ -97,8 +98,7 @@ class MapBuilder {
   std::vector<KeyFrame> key_frames_;
   std::vector<std::vector<Segment2>> segments_;  // of the key frames
   std::vector<std::vector<LiftedPart>> parts_;   // of those, by their depth images
-  DepthFit depth_fit_;                           // of the last Build()
-  bool is_depth_compared_ = false;               // with what the views say, in the last Build()
+  std::optional<DepthFit> depth_fit_;            // of the last Build(), where depth was compared
   std::unordered_set<int64_t> timestamps_;
   MapBuildStats stats_;
 };

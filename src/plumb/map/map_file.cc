@@ -20,7 +20,6 @@
 namespace plumb {
 namespace {
 
-constexpr const char* kManifestName = kMapManifestName;
 constexpr const char* kTilesName = "tiles";
 constexpr std::string_view kTileEnding = ".plt";
 constexpr size_t kMaxManifestBytes = 64 << 10;
@@ -74,7 +73,7 @@ void RemoveMap(const std::string& directory) {
     }
   }
   rmdir(tiles.c_str());
-  unlink(Inside(directory, kManifestName).c_str());
+  unlink(Inside(directory, kMapManifestName).c_str());
   rmdir(directory.c_str());
 }
 
@@ -94,8 +93,8 @@ Status WriteFiles(const std::string& directory, const MapManifest& manifest,
     }
   }
   if (Status status = SyncDirectory(*tiles_fd, tiles_path); !status) return status;
-  if (Status status = WriteNewFileAt(*map_fd, kManifestName, WriteManifest(manifest),
-                                     Inside(directory, kManifestName));
+  if (Status status = WriteNewFileAt(*map_fd, kMapManifestName, WriteManifest(manifest),
+                                     Inside(directory, kMapManifestName));
       !status) {
     return status;
   }
@@ -161,7 +160,7 @@ Result<MapTiles> ReadTiles(const FileDescriptor& map_fd, const MapManifest& mani
 }  // namespace
 
 bool IsMapFile(std::string_view name) {
-  if (name == kManifestName) return true;
+  if (name == kMapManifestName) return true;
   const std::string folder = std::string(kTilesName) + "/";
   if (!name.starts_with(folder)) return false;
   name.remove_prefix(folder.size());
@@ -214,9 +213,9 @@ Status WriteMap(const LineMap& map, const std::string& directory, const WriteMap
 Result<LineMap> ReadMap(const std::string& directory) {
   const Result<FileDescriptor> map_fd = OpenDirectory(directory);
   if (!map_fd) return map_fd.error();
-  const std::string manifest_path = Inside(directory, kManifestName);
+  const std::string manifest_path = Inside(directory, kMapManifestName);
   const Result<std::string> text =
-      ReadFileAt(*map_fd, kManifestName, kMaxManifestBytes, manifest_path);
+      ReadFileAt(*map_fd, kMapManifestName, kMaxManifestBytes, manifest_path);
   if (!text) return text.error();
   const auto in_file = [&](Error error) {
     error.message = directory + ": " + error.message;

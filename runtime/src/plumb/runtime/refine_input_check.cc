@@ -106,12 +106,14 @@ Status CheckPriors(const PosePrior& prior, std::span<const PosePrior> more_prior
 Status CheckPoints(std::span<const PointMatch> points) {
   for (size_t i = 0; i < points.size(); ++i) {
     const PointMatch& point = points[i];
-    const std::string name = "points[" + std::to_string(i) + "]";
+    const auto invalid = [i](const std::string& what) -> Status {
+      return Invalid("points[" + std::to_string(i) + "] " + what);
+    };
     if (!IsPixel(point.pixel)) {
-      return Invalid(name + " at " + Text(point.pixel) + " is not in pixels of an image");
+      return invalid("at " + Text(point.pixel) + " is not in pixels of an image");
     }
     if (!point.point_in_world.allFinite() || !point.deviation_in_world.allFinite()) {
-      return Invalid(name + " in the world " + Text(point.point_in_world) + " with deviation " +
+      return invalid("in the world " + Text(point.point_in_world) + " with deviation " +
                      Text(point.deviation_in_world) + " is not finite");
     }
   }
